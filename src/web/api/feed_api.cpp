@@ -34,6 +34,7 @@ struct Feed {
   FeedParameters parameters;
   /// Only of hazards of which drivers are told, whoever asks.
   bool for_drivers;
+  bool gathers;  ///< It writes nothing before it has all hazards.
   std::shared_ptr<FeedFormat> (*make)();
 };
 
@@ -43,24 +44,34 @@ constexpr std::array<Feed, 7> kFeeds{{
      WzdxFeed::kType,
      {},
      true,
+     true,
      NewFormat<WzdxFeed>},
-    {"/feeds/cifs.json", "Incidents (Waze CIFS)", CifsFeed::kType, {}, true, NewFormat<CifsFeed>},
+    {"/feeds/cifs.json",
+     "Incidents (Waze CIFS)",
+     CifsFeed::kType,
+     {},
+     true,
+     false,
+     NewFormat<CifsFeed>},
     {"/feeds/srti.xml",
      "Safety-related traffic information (DATEX II v3)",
      DatexFeed::kType,
      {},
      true,
+     false,
      NewFormat<DatexFeed>},
     {"/feeds/denm.ndjson",
      "Hazards as ETSI DENM in JSON",
      DenmFeed::kType,
      {false, true},
      true,
+     false,
      NewFormat<DenmFeed>},
     {"/feeds/hazards.atom",
      "Hazards (Atom with GeoRSS)",
      GeoRssFeed::kType,
      {true, false},
+     false,
      false,
      NewFormat<GeoRssFeed>},
     {"/feeds/hazards.csv",
@@ -68,11 +79,13 @@ constexpr std::array<Feed, 7> kFeeds{{
      CsvFeed::kType,
      {true, false},
      false,
+     false,
      NewFormat<CsvFeed>},
     {"/feeds/hazards.gpx",
      "Hazards (GPX waypoints)",
      GpxFeed::kType,
      {true, false},
+     false,
      false,
      NewFormat<GpxFeed>},
 }};
@@ -127,7 +140,10 @@ HttpResponse FeedApi::Answer(const RequestTarget& target, const HttpRequest& que
     const FeedHead head = HeadOf(question);
     const std::string tag = tags_.TagOf(zone_.Sequence(), head.now_ns, head.base, question, sees);
     if (auto unchanged = ChangeTags::Unchanged(tag, question)) return *std::move(unchanged);
-    HttpResponse answer = Stream(feed.make(), feed.type, head, std::move(query), all);
+    auto slot = feed.gathers ? slots_.Take() : nullptr;
+    if (feed.gathers && !slot) return MakeBusyAnswer("too many of these feeds are being made now");
+    HttpResponse answer =
+        Stream(feed.make(), feed.type, head, std::move(query), all, std::move(slot));
     NameTheFile(target.path, answer);
     return ChangeTags::Tagged(std::move(answer), tag);
   }
@@ -172,14 +188,15 @@ FeedHazard FeedApi::MakeHazard(const zone::Hazard& hazard, std::int64_t now_ns) 
 }
 
 HttpResponse FeedApi::Stream(std::shared_ptr<FeedFormat> format, const char* type,
-                             const FeedHead& head, FeedQuery query, bool all) const {
+                             const FeedHead& head, FeedQuery query, bool all,
+                             std::shared_ptr<void> slot) const {
   zone::Walk<zone::HazardState> walk;
   walk.box = query.box;
   walk.after = query.since.value_or(0);
   walk.until = zone_.Sequence();  // Before the first read.
   walk.states = StatesOf(query, all);
   auto pieces = [this, format = std::move(format), head, query = std::move(query),
-                 walk = std::move(walk), all, is_begun = false,
+                 walk = std::move(walk), all, slot = std::move(slot), is_begun = false,
                  is_read = false](std::string& piece) mutable {
     if (!is_begun) format->Begin(head, piece);
     is_begun = true;

@@ -10,6 +10,7 @@
 #include "web/feeds/change_tags.h"
 #include "web/feeds/feed_format.h"
 #include "web/feeds/feed_query.h"
+#include "web/feeds/gathering_slots.h"
 #include "web/http/http_message.h"
 #include "web/http/request_target.h"
 #include "web/http/site.h"
@@ -39,9 +40,9 @@ class FeedApi {
  private:
   HttpResponse List(const HttpRequest& question) const;
   HttpResponse OneDenm(const std::string& id) const;
-  /// The hazards that the query selects, written by `format`.
+  /// The hazards that the query selects, written by `format`, which holds `slot` so long.
   HttpResponse Stream(std::shared_ptr<FeedFormat> format, const char* type, const FeedHead& head,
-                      FeedQuery query, bool all) const;
+                      FeedQuery query, bool all, std::shared_ptr<void> slot) const;
   FeedHead HeadOf(const HttpRequest& question) const;
   FeedHazard MakeHazard(const zone::Hazard& hazard, std::int64_t now_ns) const;
 
@@ -50,6 +51,7 @@ class FeedApi {
   const protocol::HazardCatalogue& catalogue_;
   const Clock now_ns_;
   const ChangeTags tags_;
+  mutable GatheringSlots slots_;
 };
 
 }  // namespace livemap::web

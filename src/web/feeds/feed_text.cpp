@@ -109,9 +109,9 @@ std::string CsvText(std::string_view text) {
   std::string field = is_formula ? "'" : "";
   bool must_quote = is_formula;
   ForEachCharacter(text, [&](std::string_view character) {
-    if (character.front() == '\0') return;
     if (character == "\"") field += '"';
-    field += character;
+    // Left out, it would bring what stands behind it to the front.
+    field += character.front() == '\0' ? kReplacement : character;
     must_quote =
         must_quote || std::string_view("\",;\r\n ").find(character) != std::string_view::npos;
   });

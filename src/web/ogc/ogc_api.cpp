@@ -231,7 +231,10 @@ HttpResponse OgcApi::MapChanges(const Asked& asked, const OgcQuery& query) const
 
 /// All hazards are counted before the first street is written.
 HttpResponse OgcApi::Streets(const Asked& asked, const OgcQuery& query) const {
-  auto pieces = [this, writer = FeatureWriter(asked.server, asked.target, asked.now_ns),
+  auto slot = slots_.Take();
+  if (!slot) return MakeBusyAnswer("too many of these pages are being made now");
+  auto pieces = [this, slot = std::move(slot),
+                 writer = FeatureWriter(asked.server, asked.target, asked.now_ns),
                  self = asked.self, sees = asked.sees, query, walk = HazardWalk(asked.sees),
                  counts = std::make_shared<StreetCounts>(*zone_.streets()), is_counted = false,
                  after = query.cursor](std::string& piece) mutable {

@@ -8,6 +8,7 @@
 #include "common/clock.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/feeds/change_tags.h"
+#include "web/feeds/gathering_slots.h"
 #include "web/http/http_message.h"
 #include "web/http/request_target.h"
 #include "web/http/site.h"
@@ -70,6 +71,7 @@ class OgcApi {
   const protocol::HazardCatalogue& catalogue_;
   const Clock now_ns_;
   const ChangeTags tags_;
+  mutable GatheringSlots slots_;
 };
 
 }  // namespace livemap::web

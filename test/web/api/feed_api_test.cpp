@@ -145,6 +145,15 @@ TEST_F(FeedApiTest, IsWrittenInPiecesThatDoNotGrow) {
   }
 }
 
+TEST_F(FeedApiTest, FewFeedsGatherAtOnce) {
+  std::vector<HttpResponse> answers;
+  for (int i = 0; i < GatheringSlots::kMost; ++i) answers.push_back(Ask("/feeds/wzdx.geojson"));
+  EXPECT_EQ(Ask("/feeds/wzdx.geojson").status, 503);
+  EXPECT_EQ(Ask("/feeds/cifs.json").status, 200);
+  answers.pop_back();
+  EXPECT_EQ(Ask("/feeds/wzdx.geojson").status, 200);
+}
+
 TEST_F(FeedApiTest, AHostThatIsNoneIsNotRepeated) {
   HttpRequest question;
   question.target = "/feeds";

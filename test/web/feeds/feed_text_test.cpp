@@ -39,6 +39,7 @@ TEST(CsvText, KeepsSpreadsheetsFromRunningIt) {
     const std::string field = CsvText(text);
     EXPECT_EQ(field.substr(0, 2), "\"'") << field;
   }
+  EXPECT_EQ(CsvText(std::string("\0@", 2)), "\uFFFD@");
   EXPECT_EQ(CsvText("=HYPERLINK(\"http://evil\")"), "\"'=HYPERLINK(\"\"http://evil\"\")\"");
 }
 
