@@ -98,7 +98,7 @@ void AppendFixed(std::string& text, double number, int digits) {
   text.append(buffer.data(), static_cast<std::size_t>(end.ptr - buffer.data()));
 }
 
-void AppendDegrees(std::string& text, double degrees) { AppendFixed(text, degrees, 7); }
+void AppendCoordinate(std::string& text, double degrees) { AppendFixed(text, degrees, 7); }
 
 std::string CsvText(std::string_view text) {
   // Spreadsheets run what begins so (OWASP, CSV injection), also behind blanks.

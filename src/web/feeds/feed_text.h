@@ -14,7 +14,7 @@ std::string XmlText(std::string_view text);
 void AppendElement(std::string& xml, std::string_view name, std::string_view text);
 
 /// Appends a coordinate or angle to 1e-7 degrees, without an exponent.
-void AppendDegrees(std::string& text, double degrees);
+void AppendCoordinate(std::string& text, double degrees);
 
 /// Appends a number with so many digits after the point, without an exponent.
 void AppendFixed(std::string& text, double number, int digits);

@@ -43,9 +43,9 @@ TEST(CsvText, KeepsSpreadsheetsFromRunningIt) {
   EXPECT_EQ(CsvText("=HYPERLINK(\"http://evil\")"), "\"'=HYPERLINK(\"\"http://evil\"\")\"");
 }
 
-TEST(AppendDegrees, WritesNoExponent) {
+TEST(AppendCoordinate, WritesNoExponent) {
   std::string text;
-  AppendDegrees(text, -1e-7);
+  AppendCoordinate(text, -1e-7);
   EXPECT_EQ(text, "-0.0000001");
 }
 

@@ -14,9 +14,9 @@ constexpr double kCifsLineM = 20;
 
 void AppendCifsPoint(std::string& polyline, const geo::GeoPoint& point) {
   if (!polyline.empty()) polyline += ' ';
-  AppendDegrees(polyline, point.latitude_deg);
+  AppendCoordinate(polyline, point.latitude_deg);
   polyline += ' ';
-  AppendDegrees(polyline, point.longitude_deg);
+  AppendCoordinate(polyline, point.longitude_deg);
 }
 
 /// ISO 8601 with an offset, as the specification's examples have it.

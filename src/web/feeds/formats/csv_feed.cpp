@@ -20,9 +20,9 @@ void CsvFeed::Add(const FeedHazard& hazard, std::string& text) {
   text += ',';
   AppendFixed(text, static_cast<double>(fact.confidence), 4);
   text += ',';
-  AppendDegrees(text, fact.position.latitude_deg);
+  AppendCoordinate(text, fact.position.latitude_deg);
   text += ',';
-  AppendDegrees(text, fact.position.longitude_deg);
+  AppendCoordinate(text, fact.position.longitude_deg);
   const Json sigma = PositionSigma(fact.covariance_m2);
   text += ',' + (sigma.is_null() ? "" : sigma.dump()) + ',' + std::to_string(fact.sightings) + ',' +
           std::to_string(fact.vehicles) + ',' + Rfc3339(fact.first_seen_ns) + ',' +

@@ -46,9 +46,9 @@ void AppendPointLocation(const geo::GeoPoint& position, std::string& xml) {
   xml +=
       "<sit:locationReference xsi:type=\"loc:PointLocation\"><loc:pointByCoordinates>"
       "<loc:pointCoordinates><loc:latitude>";
-  AppendDegrees(xml, position.latitude_deg);
+  AppendCoordinate(xml, position.latitude_deg);
   xml += "</loc:latitude><loc:longitude>";
-  AppendDegrees(xml, position.longitude_deg);
+  AppendCoordinate(xml, position.longitude_deg);
   xml += "</loc:longitude></loc:pointCoordinates></loc:pointByCoordinates></sit:locationReference>";
 }
 

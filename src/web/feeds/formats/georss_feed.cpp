@@ -40,9 +40,9 @@ void GeoRssFeed::Add(const FeedHazard& hazard, std::string& text) {
                     SecondsText(fact.last_seen_ns));
   // Latitude first, as GeoRSS has it.
   text += "<georss:point>";
-  AppendDegrees(text, fact.position.latitude_deg);
+  AppendCoordinate(text, fact.position.latitude_deg);
   text += ' ';
-  AppendDegrees(text, fact.position.longitude_deg);
+  AppendCoordinate(text, fact.position.longitude_deg);
   text += "</georss:point></entry>\n";
 }
 

@@ -17,9 +17,9 @@ void GpxFeed::Begin(const FeedHead& head, std::string& text) {
 
 void GpxFeed::Add(const FeedHazard& hazard, std::string& text) {
   text += "<wpt lat=\"";
-  AppendDegrees(text, hazard.hazard.position.latitude_deg);
+  AppendCoordinate(text, hazard.hazard.position.latitude_deg);
   text += "\" lon=\"";
-  AppendDegrees(text, hazard.hazard.position.longitude_deg);
+  AppendCoordinate(text, hazard.hazard.position.longitude_deg);
   text += "\">";
   AppendElement(text, "time", SecondsText(hazard.hazard.last_seen_ns));
   AppendElement(text, "name", hazard.label);
