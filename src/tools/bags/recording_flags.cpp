@@ -53,7 +53,7 @@ std::vector<Flag> RecordingFlags() {
       {"lens", "NAME", "instead: " + LensNames()},
       {"camera-height-m", "M", "camera above the road (1.3, or --camera's)"},
       {"camera-pitch-deg", "DEG", "how far the camera looks down (0, or --camera's)"},
-      {"camera-forward-m", "M", "camera ahead of base_link (1.5, or --camera's)"},
+      {"camera-forward-m", "M", "camera ahead of the receiver (0, or --camera's)"},
       {"fix-sigma-m", "M", "of positions that state no accuracy, per axis (3)"},
   };
 }
@@ -130,7 +130,8 @@ imaging::CameraCalibration ReadCalibrationFlags(const CommandLine& line, int wid
 
 datasets::CameraMounting ReadRecordingMounting(const CommandLine& line) {
   datasets::CameraMounting mounting;
-  mounting.forward_m = 1.5;
+  // The receivers of such recordings are in the camera, or lie beside it.
+  mounting.forward_m = 0;
   mounting.height_m = 1.3;
   if (line.Has("camera")) mounting = datasets::ReadCameraFile(line.Text("camera", "")).mounting;
   mounting.forward_m = line.Number("camera-forward-m", mounting.forward_m, -20, 20);
