@@ -6,13 +6,14 @@
 namespace livemap::streets {
 namespace {
 
-constexpr double kLeastShare = 0.03;     // Of what the angles say, whatever the speed tells.
-constexpr double kSlowShare = 0.65;      // Of the usual speed: clearly slower.
-constexpr double kStopsShare = 0.75;     // Of a turn's speed: slower than any turn needs.
-constexpr double kBendFromM = 20;        // So near the junction the course tells the side.
-constexpr double kLeastBend = 0.02;      // Density of any course, whatever way is driven.
-constexpr double kSharpestRad = 2.6;     // Sharper turns are driven as this one.
-constexpr double kMinTurnDistanceM = 1;  // To the turn's beginning.
+constexpr double kLeastShare = 0.03;   // Of what the angles say, whatever the speed tells.
+constexpr double kSlowShare = 0.65;    // Of the usual speed: clearly slower.
+constexpr double kStopsShare = 0.75;   // Of a turn's speed: slower than any turn needs.
+constexpr double kBendFromM = 20;      // So near the junction the course tells the side.
+constexpr double kLeastBend = 0.02;    // Density of any course, whatever way is driven.
+constexpr double kSharpestRad = 2.6;   // Sharper turns are driven as this one.
+constexpr double kTurnEnds = 0.3;      // Of its begin before the node: there the wheel is let go.
+constexpr double kSpeedsUpMps2 = 2.2;  // Behind a turn.
 
 double NormalShareBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
 
@@ -47,9 +48,12 @@ double SpeedStraight(const TurnConfig& config, const Approach& approach, double 
 
 double SpeedTurning(const TurnConfig& config, const Approach& approach, const Corner& corner) {
   if (approach.speed_mps < kStopsShare * corner.speed_mps) return 1;
-  const double to_turn_m = std::max(kMinTurnDistanceM, approach.distance_m - corner.begins_m);
-  const double too_fast =
-      approach.speed_mps * approach.speed_mps - corner.speed_mps * corner.speed_mps;
+  const double to_turn_m = std::max(config.least_turn_distance_m,
+                                    approach.distance_m - config.slowest_share * corner.begins_m);
+  // Behind the turn it speeds up again.
+  const double behind_m = std::max(0.0, -approach.distance_m - kTurnEnds * corner.begins_m);
+  const double too_fast = approach.speed_mps * approach.speed_mps -
+                          corner.speed_mps * corner.speed_mps - 2 * kSpeedsUpMps2 * behind_m;
   const double needed_mps2 = too_fast / (2 * to_turn_m);
   const auto share_above = [&](double mps2) {
     return NormalShareBelow((mps2 - needed_mps2) / config.braking_sigma_mps2);

@@ -30,12 +30,15 @@ struct TurnConfig {
   double straight_rad = 0.6;     ///< A way on that bends less goes straight on.
   double straight_weight = 1.0;  ///< Before anything is known of how the vehicle drives.
   double turn_weight = 0.3;
-  double leaves_ring_weight = 0.6;    ///< Of an exit against the ring's own 1.
-  double past_entry_weight = 0.1;     ///< Of the ring behind its last exit, against that exit.
-  double same_street_weight = 1.5;    ///< Factor.
-  double lesser_weight = 0.4;         ///< Factor.
-  double corner_m = 10;               ///< Radius of a turn by a right angle, m.
-  double sideways_mps2 = 2.2;         ///< That drivers take in turns.
+  double leaves_ring_weight = 0.6;  ///< Of an exit against the ring's own 1.
+  double past_entry_weight = 0.1;   ///< Of the ring behind its last exit, against that exit.
+  double same_street_weight = 1.5;  ///< Factor.
+  double lesser_weight = 0.4;       ///< Factor.
+  double corner_m = 10;             ///< Radius of a turn by a right angle, m.
+  double sideways_mps2 = 2.2;       ///< That drivers take in turns.
+  /// Drivers brake into a turn: they are that slow at this share of its begin before the node.
+  double slowest_share = 0.7;
+  double least_turn_distance_m = 3;   ///< To where they are, m.
   double braking_mps2 = 2.5;          ///< How drivers brake before turns, mean...
   double braking_sigma_mps2 = 0.5;    ///< ...and standard deviation.
   double push_sigma_mps2 = 0.4;       ///< Of the measured acceleration.

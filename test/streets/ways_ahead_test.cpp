@@ -102,6 +102,28 @@ TEST_F(WaysAheadTest, WhoIsMatchedBehindTheJunctionAndHasTurnedIsNotTakenToGoStr
   }
 }
 
+TEST_F(WaysAheadTest, WhoHasTurnedAndSpeedsUpIsNotTakenToGoStraightOn) {
+  Driving driving = Steady(7);
+  driving.usual_mps = 14;
+  driving.push_mps2 = 1.8;
+  driving.course_rad = -1.57;
+  driving.approach = Travel{0, true};
+  const std::vector<StreetMatch> matches{{{2, true}, 14, 0, 1}};
+  const WaysAhead ways(config_, map_, matches, frame_, driving, 100);
+  double left = 0;
+  for (const Leg& leg : ways.legs()) {
+    if (leg.travel.segment == 2) left = leg.probability;
+  }
+  EXPECT_GT(left, 0.9);
+}
+
+TEST_F(WaysAheadTest, WhoBrakesToATurnsSpeedRightBeforeTheJunctionTurns) {
+  Driving driving = Steady(6.5);
+  driving.usual_mps = 14;
+  driving.push_mps2 = -2;
+  EXPECT_LT(Shares(88, driving)[0], 0.5);
+}
+
 TEST_F(WaysAheadTest, OneWayStreetsAreNoChoice) {
   map_ = CrossTown(frame_, false);
   EXPECT_EQ(Shares(10, Steady(14))[2], 0);
