@@ -57,6 +57,31 @@ Fit UpdateModePlace(const Eigen::Vector2d& place_m, double noise_m, Mode& mode) 
   return {distance, std::exp(-0.5 * distance) / std::sqrt(innovation.determinant())};
 }
 
+/// The likelihood of the velocity. One that misfits does not change the state.
+double UpdateModeVelocity(const Eigen::Vector2d& plane_mps, double noise_mps, Mode& mode) {
+  const double speed = mode.state[CourseFilter::kSpeed];
+  const double sine = std::sin(mode.state[CourseFilter::kCourse]);
+  const double cosine = std::cos(mode.state[CourseFilter::kCourse]);
+  Eigen::Matrix<double, 2, 6> measures = Eigen::Matrix<double, 2, 6>::Zero();
+  measures.col(CourseFilter::kCourse) = speed * Eigen::Vector2d(cosine, -sine);
+  measures.col(CourseFilter::kSpeed) = Eigen::Vector2d(sine, cosine);
+  const Eigen::Matrix<double, 6, 2> spread = mode.covariance * measures.transpose();
+  const Eigen::Matrix2d innovation =
+      measures * spread + noise_mps * noise_mps * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d inverse = innovation.inverse();
+  const Eigen::Vector2d error_mps = plane_mps - speed * Eigen::Vector2d(sine, cosine);
+  const double distance = error_mps.dot(inverse * error_mps);
+  const double likelihood =
+      std::exp(-0.5 * std::min(distance, kMisfit)) / std::sqrt(innovation.determinant());
+  if (distance > kMisfit) return likelihood;
+  const Eigen::Matrix<double, 6, 2> gain = spread * inverse;
+  mode.state += gain * error_mps;
+  mode.covariance -= (gain * spread.transpose()).eval();
+  MakeSymmetric(mode.covariance);
+  mode.state[CourseFilter::kSpeed] = std::max(0.0, mode.state[CourseFilter::kSpeed]);
+  return likelihood;
+}
+
 void UpdateModeCourse(double course_rad, double course_variance_rad2, Mode& mode) {
   constexpr auto kCourse = CourseFilter::kCourse;
   const double error_rad = std::remainder(course_rad - mode.state[kCourse], 2 * M_PI);
@@ -240,11 +265,27 @@ bool CourseFilter::Update(const Sample& sample) {
   }
   misfits_ = 0;
   modes_ = updated;
-  const double steady = std::min(std::max(weights[0] / sum, kLeastWeight), 1 - kLeastWeight);
-  modes_[0].weight = steady;
-  modes_[1].weight = 1 - steady;
-  Combine();
+  Weigh(weights[0] / sum);
   return true;
+}
+
+bool CourseFilter::AddVelocity(const Velocity& velocity) {
+  const bool finite = velocity.plane_mps.allFinite() && std::isfinite(velocity.stated_sigma_mps);
+  if (!finite || !known_) return false;
+  const double noise_mps = std::max(config_.velocity_noise_mps,
+                                    config_.velocity_stated_share * velocity.stated_sigma_mps);
+  std::array<double, 2> weights{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    weights[i] = modes_[i].weight * UpdateModeVelocity(velocity.plane_mps, noise_mps, modes_[i]);
+  }
+  Weigh(weights[0] / (weights[0] + weights[1]));
+  return true;
+}
+
+void CourseFilter::Weigh(double steady) {
+  modes_[0].weight = std::min(std::max(steady, kLeastWeight), 1 - kLeastWeight);
+  modes_[1].weight = 1 - modes_[0].weight;
+  Combine();
 }
 
 void CourseFilter::Combine() {

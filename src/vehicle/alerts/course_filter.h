@@ -7,7 +7,8 @@
 
 namespace livemap::vehicle {
 
-/// Where the vehicle is, how it moves and how its way bends: Kalman filters of positions.
+/// Where the vehicle is, how it moves and how its way bends: Kalman filters of positions, and of
+/// velocities where the receiver measures them.
 ///
 /// Two of them run side by side: one believes that the road is steady (straight, or of a curvature
 /// that hardly changes), the other that it bends. Each has a weight, by how well it foretells the
@@ -27,6 +28,10 @@ class CourseFilter {
     double fix_noise_m = 0.6;
     /// The same as a share of what the receiver states; the greater of both counts.
     double stated_share = 0.15;
+    /// Of a measured velocity, standard deviation per axis, m/s...
+    double velocity_noise_mps = 0.15;
+    /// ...and as a share of what the receiver states; the greater of both counts.
+    double velocity_stated_share = 0.3;
     /// Sideways acceleration that drivers choose where the road bends, standard deviation, m/s^2:
     /// the curvature is about this by the square of the speed.
     double sideways_mps2 = 1.2;
@@ -43,8 +48,14 @@ class CourseFilter {
     double max_gap_s = 5;              ///< After longer without a position all begins anew, s.
   };
 
-  /// A position at a stamp, on a plane; course and speed where something else than the positions
-  /// tells them.
+  /// A velocity over ground that the receiver measured by the Doppler shift.
+  struct Velocity {
+    Eigen::Vector2d plane_mps = Eigen::Vector2d::Zero();  ///< East, north.
+    double stated_sigma_mps = 0;                          ///< What the receiver says, per axis.
+  };
+
+  /// A position at a stamp, on a plane; the course where something else than the positions tells
+  /// it.
   struct Sample {
     std::int64_t stamp_ns = 0;
     Eigen::Vector2d place_m = Eigen::Vector2d::Zero();  ///< East, north.
@@ -61,6 +72,9 @@ class CourseFilter {
 
   /// Takes in a position. False when it is refused: not finite, or not newer than the newest.
   bool Add(const Sample& sample);
+  /// Takes in a velocity of the newest position's moment. False when it is refused: not finite, or
+  /// course and speed are not known yet.
+  bool AddVelocity(const Velocity& velocity);
   /// Forgets everything.
   void Reset();
   /// Moves the plane's origin to `origin_m` of the present plane.
@@ -93,6 +107,7 @@ class CourseFilter {
   void Predict(double time_s, Mode& mode) const;
   void Step(double time_s, Mode& mode) const;
   bool Update(const Sample& sample);
+  void Weigh(double steady);
   void Combine();
   double NoiseM(const Sample& sample) const;
 

@@ -103,6 +103,7 @@ std::vector<HazardAlert> DriverAlerts::StartAnew() {
   if (street_way_) street_way_->Reset();
   frame_.reset();
   newest_ns_.reset();
+  velocity_.reset();
   std::sort(told.begin(), told.end(), IsWorse);
   return told;
 }
@@ -200,6 +201,9 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
   ++counters_.positions;
   const double time_s = newest_ns_ ? Seconds(stamp_ns - *newest_ns_) : 0;
   newest_ns_ = stamp_ns;
+  if (velocity_ && velocity_->first == stamp_ns && filter_.AddVelocity(velocity_->second)) {
+    ++counters_.velocities;
+  }
   if (street_way_) street_way_->Add(pose.position, sigma_m, filter_);
   if (!filter_.known()) return told;
 
@@ -231,6 +235,16 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
     return a_begins != b_begins ? b_begins : IsWorse(a, b);
   });
   return told;
+}
+
+bool DriverAlerts::AddVelocity(std::int64_t stamp_ns, const CourseFilter::Velocity& velocity) {
+  if (!velocity.plane_mps.allFinite() || !std::isfinite(velocity.stated_sigma_mps)) return false;
+  if (newest_ns_ != stamp_ns) {
+    velocity_.emplace(stamp_ns, velocity);
+  } else if (filter_.AddVelocity(velocity)) {
+    ++counters_.velocities;
+  }
+  return true;
 }
 
 /// What the vehicle has left far behind may be approached anew.

@@ -8,6 +8,7 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "common/uuid.h"
@@ -101,6 +102,7 @@ class DriverAlerts {
   struct Counters {
     std::uint64_t positions = 0;
     std::uint64_t invalid_positions = 0;
+    std::uint64_t velocities = 0;  ///< That counted.
     std::uint64_t invalid_hazards = 0;
     std::uint64_t refused_full = 0;
     std::uint64_t approaches = 0;
@@ -123,6 +125,9 @@ class DriverAlerts {
   std::vector<HazardAlert> Add(std::int64_t stamp_ns, const geo::TrackPose& pose,
                                bool course_is_measured = false,
                                std::optional<double> altitude_m = std::nullopt);
+  /// What the receiver measured by the Doppler shift at a stamp. It counts with the position of the
+  /// same stamp, whichever comes first; without one it does not. False when it is not finite.
+  bool AddVelocity(std::int64_t stamp_ns, const CourseFilter::Velocity& velocity);
   /// What is ahead now and has been told, the worst first.
   std::vector<HazardAlert> Ahead() const;
   /// The vehicle's clock was set back: positions are forgotten, hazards are not. Returns the alerts
@@ -172,6 +177,7 @@ class DriverAlerts {
   std::optional<StreetWay> street_way_;  // With a map of streets.
   std::optional<geo::LocalFrame> frame_;
   std::optional<std::int64_t> newest_ns_;
+  std::optional<std::pair<std::int64_t, CourseFilter::Velocity>> velocity_;  // Waits for its fix.
   geo::SpatialGrid grid_;
   std::vector<Known> known_;  // The grid's numbers are places in it; free ones are used again.
   std::vector<std::uint64_t> free_numbers_;

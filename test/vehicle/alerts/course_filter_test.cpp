@@ -98,6 +98,50 @@ TEST(CourseFilterTest, PositionsThatFitNothingBeginAnew) {
   EXPECT_FALSE(filter.known());
 }
 
+/// Of a vehicle that has braked by 2 m/s^2 for 0.6 s, after a steady drive northwards.
+double PushAfterBraking(bool with_velocities) {
+  CourseFilter filter{CourseFilter::Config()};
+  double north_m = 0;
+  double speed_mps = 14;
+  for (int i = 0; i <= 53; ++i) {
+    CourseFilter::Sample sample;
+    sample.stamp_ns = Nanoseconds(100 + i * 0.2);
+    sample.place_m = {0.3 * std::sin(2.1 * i), north_m + 0.3 * std::cos(3.7 * i)};
+    sample.stated_sigma_m = 1.5;
+    filter.Add(sample);
+    if (with_velocities) filter.AddVelocity({{0.1 * std::cos(1.3 * i), speed_mps}, 0.15});
+    if (i >= 50) speed_mps -= 0.4;
+    north_m += 0.2 * speed_mps;
+  }
+  return filter.state()[CourseFilter::kAcceleration];
+}
+
+TEST(CourseFilterTest, AVelocityTellsBrakingSooner) {
+  EXPECT_LT(PushAfterBraking(true), -1.2);
+  EXPECT_GT(PushAfterBraking(false), PushAfterBraking(true) + 0.5);
+}
+
+TEST(CourseFilterTest, AVelocityTellsTheCourseOfASlowVehicle) {
+  CourseFilter filter = Driven(3, 0, 10);
+  const double before = filter.covariance()(CourseFilter::kCourse, CourseFilter::kCourse);
+  EXPECT_TRUE(filter.AddVelocity({{0, 3}, 0.15}));
+  EXPECT_LT(filter.covariance()(CourseFilter::kCourse, CourseFilter::kCourse), 0.7 * before);
+}
+
+TEST(CourseFilterTest, AVelocityThatCannotBeChangesNothing) {
+  CourseFilter unknown{CourseFilter::Config()};
+  EXPECT_FALSE(unknown.AddVelocity({{0, 3}, 0.15})) << "no position yet";
+  CourseFilter filter = Driven(14, 0, 10);
+  const CourseFilter::State before = filter.state();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(filter.AddVelocity({{0, nan}, 0.15}));
+  EXPECT_FALSE(filter.AddVelocity({{0, 14}, nan}));
+  EXPECT_EQ(filter.state(), before);
+  EXPECT_TRUE(filter.AddVelocity({{-14, 0}, 0.15})) << "a finite one is taken...";
+  EXPECT_NEAR(filter.state()[CourseFilter::kSpeed], 14, 0.5) << "...but does not count";
+  EXPECT_NEAR(filter.state()[CourseFilter::kCourse], 0, 0.05);
+}
+
 TEST(CourseFilterTest, AMeasuredCourseCountsFromTheFirstPosition) {
   CourseFilter filter{CourseFilter::Config()};
   CourseFilter::Sample sample;

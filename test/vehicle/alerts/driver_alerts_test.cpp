@@ -105,6 +105,22 @@ TEST_F(DriverAlertsTest, WarnsOnceAndInTimeOfWhatLiesAhead) {
   EXPECT_EQ(alert.class_name, "pothole");
 }
 
+TEST_F(DriverAlertsTest, AVelocityCountsWithTheFixOfItsStampWhicheverComesFirst) {
+  Drive(50, 14);
+  const auto next_ns = Nanoseconds(1000 + time_s_ + kStepS);
+  EXPECT_TRUE(alerts_.AddVelocity(next_ns, {{0, 14}, 0.1}));
+  EXPECT_EQ(alerts_.counters().velocities, 0U) << "its fix has yet to come";
+  Stand(kStepS);
+  EXPECT_EQ(alerts_.counters().velocities, 1U);
+  Stand(kStepS);
+  EXPECT_TRUE(alerts_.AddVelocity(Nanoseconds(1000 + time_s_), {{0, 14}, 0.1}));
+  EXPECT_EQ(alerts_.counters().velocities, 2U);
+  EXPECT_TRUE(alerts_.AddVelocity(Nanoseconds(1000 + time_s_ + 0.05), {{0, 14}, 0.1}));
+  Stand(kStepS);
+  EXPECT_EQ(alerts_.counters().velocities, 2U) << "no fix has that stamp";
+  EXPECT_FALSE(alerts_.AddVelocity(0, {{std::numeric_limits<double>::quiet_NaN(), 0}, 0.1}));
+}
+
 TEST_F(DriverAlertsTest, TheFasterTheEarlier) {
   EXPECT_GE(alerts_.LeadS(2, 5), 4);
   EXPECT_GT(alerts_.LeadS(2, 36), alerts_.LeadS(2, 14) + 1);
