@@ -1,9 +1,13 @@
+#include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <livemap/HazardAlert.h>
 #include <livemap/HazardNotice.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/package.h>
 #include <sensor_msgs/NavSatFix.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
@@ -56,6 +60,7 @@ class DriverAlertPart : public NodeletPart {
     subscribers_ = {
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
         node.subscribe("fix", 100, &Self::OnFix, this),
+        node.subscribe("gps/velocity", 100, &Self::OnVelocity, this),
     };
     if (config_.use_fused) {
       vehicle_tf_ = std::make_unique<VehicleTf>(node, getName(), config_.map_frame,
@@ -138,6 +143,16 @@ class DriverAlertPart : public NodeletPart {
     Tell(alerts_->Add(fix.stamp_ns, *fixes_->Newest()), message.header.stamp);
   }
 
+  void OnVelocity(const geometry_msgs::TwistWithCovarianceStamped& message) {
+    if (!stamps_->IsUsable("a receiver's velocity", message.header.stamp)) return;
+    constexpr std::size_t kYY = 7;
+    const auto& covariance = message.twist.covariance;
+    const double variance = std::max({0.0, covariance[0], covariance[kYY]});
+    const auto& linear = message.twist.twist.linear;
+    alerts_->AddVelocity(ros_io::FromRosTime(message.header.stamp),
+                         {{linear.x, linear.y}, std::sqrt(variance)});
+  }
+
   void OnPose(const nav_msgs::Odometry& message) {
     const std::optional<geo::TrackPose> pose = vehicle_tf_->FusedPose(message);
     if (!pose || !stamps_->IsUsable("a fused pose", message.header.stamp)) return;
@@ -175,6 +190,7 @@ class DriverAlertPart : public NodeletPart {
     status.add("fixes_refused", fixes_refused_);
     status.add("positions", positions);
     status.add("positions_invalid", counters.invalid_positions);
+    status.add("velocities", counters.velocities);
     status.add("street_segments", street_segments_);
     status.add("on_street", alerts_->on_street());
     status.add("alerts", counters.approaches);

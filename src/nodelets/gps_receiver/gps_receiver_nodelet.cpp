@@ -89,10 +89,11 @@ class GpsReceiverPart : public NodeletPart {
       const MutexLock lock(mutex_);
       taken = watch_->OnReport(report, now);
     }
-    if (taken.fix) fix_publisher_.publish(ros_io::ToMessage(*taken.fix, config_.frame));
+    // The velocity first: who decides at a fix has it by then.
     if (taken.velocity) {
       velocity_publisher_.publish(ros_io::ToMessage(*taken.velocity, config_.frame));
     }
+    if (taken.fix) fix_publisher_.publish(ros_io::ToMessage(*taken.fix, config_.frame));
     // The time of a receiver without a fix may be anything.
     if (taken.says_no_fix) {
       fix_publisher_.publish(ros_io::NoFixMessage(now.system_ns, config_.frame));

@@ -60,6 +60,11 @@ void ReadAlertWay(ParameterReader& parameters, vehicle::DriverAlerts::Config& al
                      "docs/explanation/driver-alerts.md has the model.");
   parameters.Read("fix_noise_m", alerts.course.fix_noise_m, {0.01, 100},
                   "Scatter of a fix against its neighbours, standard deviation per axis.", "m");
+  parameters.Read(
+      "velocity_noise_mps", alerts.course.velocity_noise_mps, {0.01, 100},
+      "Scatter of the receiver's velocity, standard deviation per axis. 30 % of what the "
+      "receiver states counts where that is more.",
+      "m/s");
   parameters.Read("sideways_mps2", alerts.course.sideways_mps2, {0.05, 10},
                   "Sideways acceleration in bends, standard deviation.", "m/s^2");
   parameters.Read("steady_mps2", alerts.course.steady_mps2, {0.001, 10},
