@@ -70,6 +70,7 @@ class AlertRun {
 
   std::vector<GivenAlert> Drive() {
     datasets::GnssReceiverModel receiver(trial_.receiver, trial_.seed * 7919 + 2);
+    datasets::SeededRandom random(trial_.seed * 7919 + 4);
     vehicle::FixTrack track{vehicle::FixTrack::Config()};
     const auto every =
         std::max(1, static_cast<int>(std::lround(1 / (trial_.fixes_per_s * kTrafficStepS))));
@@ -85,6 +86,11 @@ class AlertRun {
       if (verdict != vehicle::FixTrack::Verdict::kAccepted || track.newest_ns() != fix.stamp_ns) {
         continue;
       }
+      if (trial_.velocity_sigma_mps > 0) {
+        alerts_.AddVelocity(fix.stamp_ns,
+                            {VelocityAt(i) + trial_.velocity_sigma_mps * random.Normal(),
+                             trial_.velocity_sigma_mps});
+      }
       const auto told = alerts_.Add(fix.stamp_ns, *track.Newest());
       for (const vehicle::HazardAlert& alert : told) Note(alert, moment.time_s + trial_.latency_s);
     }
@@ -97,6 +103,12 @@ class AlertRun {
     if (!trial.streets) return nullptr;
     return DrawStreetMap(drive.streets, drive.junctions_m, frame_, trial.map_errors,
                          trial.seed * 7919 + 3);
+  }
+
+  /// The true one in the last step before a moment, as a receiver has it: nothing of what comes.
+  Eigen::Vector2d VelocityAt(std::size_t i) const {
+    if (i == 0) return Eigen::Vector2d::Zero();
+    return (drive_.moments[i].place_m - drive_.moments[i - 1].place_m) / kTrafficStepS;
   }
 
   void Note(const vehicle::HazardAlert& alert, double time_s) {

@@ -19,6 +19,8 @@ struct AlertTrial {
   /// Of the receiver: white and slow errors, losses of the fix.
   datasets::GnssReceiverNoise receiver{0.4, 1.5, 60, 0.1, 3};
   double fixes_per_s = 5;
+  /// Of the velocity that the receiver measures beside each fix, per axis; 0: it measures none.
+  double velocity_sigma_mps = 0.15;
   double latency_s = 0.1;    ///< From a fix's stamp until the vehicle has it.
   double place_sigma_m = 1;  ///< Of the hazards on the zone's map, per axis; the zone tells it.
   std::uint64_t seed = 1;

@@ -93,6 +93,9 @@ int EvaluateAlerts(int argc, char** argv) {
        {"fixes-per-s", "X", "of the receiver, default 5; 1 to 10"},
        {"fix-noise-m", "X", "new at every fix, standard deviation per axis, m, default 0.4"},
        {"fix-bias-m", "X", "slow error of the fixes, the same, m, default 1.5"},
+       {"velocity-noise-mps", "X",
+        "of the velocity that the receiver measures with each fix, standard deviation per axis,\n"
+        "m/s, default 0.15; 0: it measures none"},
        {"place-sigma-m", "X", "of the hazards on the zone's map, the same, m, default 1"},
        {"absent", "X", "share of the streets that the map does not have, default 0.02"},
        {"hazards", "FILE", "catalogue of hazard classes; default: every class has rank 2"}});
@@ -106,6 +109,7 @@ int EvaluateAlerts(int argc, char** argv) {
   trial.fixes_per_s = line.Number("fixes-per-s", trial.fixes_per_s, 1, 10);
   trial.receiver.white_sigma_m = line.Number("fix-noise-m", trial.receiver.white_sigma_m, 0, 100);
   trial.receiver.bias_sigma_m = line.Number("fix-bias-m", trial.receiver.bias_sigma_m, 0, 100);
+  trial.velocity_sigma_mps = line.Number("velocity-noise-mps", trial.velocity_sigma_mps, 0, 100);
   trial.place_sigma_m = line.Number("place-sigma-m", trial.place_sigma_m, 0, 100);
   trial.map_errors.absent_share = line.Number("absent", trial.map_errors.absent_share, 0, 1);
   const std::string hazards = line.Text("hazards", "");
