@@ -41,6 +41,7 @@ DriverAlerts::DriverAlerts(const Config& config, const protocol::HazardCatalogue
   CheckPositive("reach in metres", config.max_reach_m);
   CheckPositive("step of the way in metres", config.way.step_m);
   CheckPositive("spacing of bends in metres", config.way.bend_spacing_m);
+  CheckPositive("other roads' hazards per metre", config.way.others_per_m);
   CheckPositive("noise of a fix in metres", config.course.fix_noise_m);
   if (map) street_way_.emplace(std::move(map), config.streets);
 }
@@ -164,7 +165,9 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
   WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
   if (!street_way_) return relation;
   const StreetWay::Relation street = street_way_->RelationOf(place_m, sigma_m * sigma_m);
-  const double by_course = street.unknown * relation.probability;
+  // The map may lack the vehicle's carriageway, but have the opposite one.
+  const double others = (1 - relation.probability) * street.against / config_.way.others_per_m;
+  const double by_course = street.unknown * relation.probability / (1 + others);
   if (street.ahead && street.probability >= by_course) {
     relation.ahead = true;
     relation.way_m = street.way_m;

@@ -10,6 +10,7 @@ namespace {
 constexpr double kMaxWayM = 1000;
 constexpr double kMuchDenser = 3;        // A street's edge is half as dense as its middle.
 constexpr double kLeftRingM = 15;        // So far on another street a ring is left behind.
+constexpr double kAgainstCosine = -0.5;  // Of a one-way street to the course.
 constexpr double kParallelCosine = 0.8;  // Streets of the same level cross at more than this.
 
 double NormalBelow(double value) { return 0.5 * std::erfc(-value / std::sqrt(2)); }
@@ -106,12 +107,18 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
   const streets::WaysAhead ways(config_.ways, *map_, matcher_.matches(), frame, driving, reach_m);
   legs_ = ways.legs();
   others_.clear();
-  if (legs_.empty() || !last_) return;
+  if (!last_) return;
+  const Eigen::Vector2d course(std::sin(driving.course_rad), std::cos(driving.course_rad));
   for (const std::uint32_t segment : map_->SegmentsNear(*last_, reach_m)) {
     const streets::StreetMap::Segment& ends = map_->SegmentAt(segment);
     const streets::Street& street = map_->StreetOf(segment);
-    others_.push_back({frame.ToEnu(map_->PlaceOf(ends.from)), frame.ToEnu(map_->PlaceOf(ends.to)),
-                       street.HalfWidthM(), street.layer, ways.Touches(segment)});
+    const Eigen::Vector2d from_m = frame.ToEnu(map_->PlaceOf(ends.from));
+    const Eigen::Vector2d to_m = frame.ToEnu(map_->PlaceOf(ends.to));
+    const double cosine =
+        (street.forward ? 1 : -1) * course.dot((to_m - from_m).stableNormalized());
+    const bool against = driving.course_known && street.one_way() && cosine < kAgainstCosine;
+    others_.push_back(
+        {from_m, to_m, street.HalfWidthM(), street.layer, ways.Touches(segment), against});
   }
 }
 
@@ -143,7 +150,7 @@ std::vector<StreetWay::OtherNear> StreetWay::OthersNear(const Eigen::Vector2d& p
   for (const Other& other : others_) {
     const Beside beside = BesideOf(other.from_m, other.to_m, place_m);
     if (beside.off_m > other.half_width_m + reach_m) continue;
-    near.push_back({other.to_m - other.from_m, other.layer, other.meets,
+    near.push_back({other.to_m - other.from_m, other.layer, other.meets, other.against,
                     Density(beside.off_m, other.half_width_m, variance_m2)});
   }
   return near;
@@ -182,6 +189,9 @@ StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
   double chosen = 0;
   std::vector<Best> best(legs_.size());
   const std::vector<OtherNear> others = OthersNear(place_m, variance_m2);
+  for (const OtherNear& other : others) {
+    if (other.against) relation.against = std::max(relation.against, other.density);
+  }
   for (std::size_t i = 0; i < legs_.size(); ++i) {
     const streets::Leg& leg = legs_[i];
     if (leg.before < 0) matched += leg.probability;

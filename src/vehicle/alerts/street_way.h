@@ -38,12 +38,14 @@ class StreetWay {
 
   /// How a place lies to the streets ahead.
   struct Relation {
-    bool ahead = false;      ///< On a way ahead; else nothing but `unknown` is set.
+    bool ahead = false;      ///< On a way ahead; else nothing but `unknown` and `against` is set.
     double way_m = 0;        ///< Along that way.
     double left_m = 0;       ///< Of the middle of its carriageway.
     double probability = 0;  ///< That it lies on the vehicle's way and that way on the streets.
     double path = 0;         ///< That the vehicle's way leads there at all.
     double unknown = 1;      ///< That the vehicle's way there does not follow the map.
+    /// Density of one-way streets against the vehicle's course, on which it cannot be, 1/m.
+    double against = 0;
   };
 
   /// `map` must not be null. Throws Error for a config that cannot be.
@@ -71,13 +73,15 @@ class StreetWay {
     Eigen::Vector2d from_m, to_m;
     double half_width_m;
     int layer;
-    bool meets;  // The way, at a node.
+    bool meets;    // The way, at a node.
+    bool against;  // It is a one-way street against the vehicle's course.
   };
   /// One near a place, with the density that it has there.
   struct OtherNear {
     Eigen::Vector2d along;  // From its begin to its end.
     int layer;
     bool meets;
+    bool against;
     double density;
   };
 

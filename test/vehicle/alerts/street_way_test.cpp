@@ -159,6 +159,27 @@ TEST_F(StreetWayTest, AParallelStreetIsNotTheOwn) {
   EXPECT_TRUE(IsTold(2));
 }
 
+TEST_F(StreetWayTest, WhereTheMapHasOnlyTheOtherCarriagewayWhatLiesThereIsNotTold) {
+  drawn_.Add({{-14, 900}, {-14, 0}}, true);
+  const auto drive = [&] {
+    place_m_ = {0, 0};
+    told_s_.clear();
+    PutHazard(1, -14, 600);
+    PutHazard(2, 0, 750);
+    DriveTo(0, 450, 30);
+    DriveTo(-5, 503, 30);  // Swerves towards the other carriageway.
+    DriveTo(0, 560, 30);
+    DriveTo(0, 800, 30);
+  };
+  alerts_ = std::make_unique<DriverAlerts>(DriverAlerts::Config(), protocol::HazardCatalogue());
+  drive();
+  EXPECT_TRUE(IsTold(1)) << "by the course alone it is";
+  Begin();
+  drive();
+  EXPECT_FALSE(IsTold(1));
+  EXPECT_TRUE(IsTold(2));
+}
+
 TEST_F(StreetWayTest, WhereTheMapHasNoStreetTheCourseCounts) {
   drawn_.Add({{3000, 0}, {3000, 800}});
   Begin();
