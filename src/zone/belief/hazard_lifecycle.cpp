@@ -293,6 +293,21 @@ LifecycleUpdate HazardLifecycle::Reject(const ClassModel& entry, const std::stri
   return step;
 }
 
+LifecycleUpdate HazardLifecycle::Doubt(const ClassModel& entry, const std::string& why,
+                                       std::int64_t now_ns, PresenceRecord& life) const {
+  LifecycleUpdate step;
+  if (!IsTold(life.state)) return step;
+  MoveTo(entry, now_ns, life);
+  const double presence = std::max(std::min(0.5, VerifyBelow(entry)), config_.gone_below);
+  life.log_odds = std::min(life.log_odds, LogOddsOf(presence));
+  life.official = false;
+  step.transition = LifecycleTransitionOf(life, HazardState::kVerifying, why);
+  if (life.state != HazardState::kVerifying) {
+    EnterLifecycleState(HazardState::kVerifying, now_ns, life);
+  }
+  return step;
+}
+
 LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle,
                                           const std::string& why, std::int64_t now_ns,
                                           PresenceRecord& life) const {

@@ -105,6 +105,11 @@ class HazardLifecycle {
   LifecycleUpdate Reject(const ClassModel& entry, const std::string& official,
                          const std::string& reason, std::int64_t now_ns,
                          PresenceRecord& life) const;
+  /// Somebody who should know says that it was repaired, which nobody has looked at: a hazard that
+  /// drivers are told of is verified, as likely there as not. That no longer counts as an
+  /// official's confirmation. Judges nobody. No transition for any other hazard.
+  LifecycleUpdate Doubt(const ClassModel& entry, const std::string& why, std::int64_t now_ns,
+                        PresenceRecord& life) const;
   /// All that the vehicle said is taken back: the odds are as if it had said nothing, and a hazard
   /// that no other vehicle saw is gone, one that too few others saw a candidate again. What an
   /// official confirmed stays. The transition, with `why` as its reason, may lead to the same

@@ -217,6 +217,17 @@ std::optional<OfficialActions::HazardDecision> OfficialActions::Remove(const Uui
   return decision;
 }
 
+std::optional<OfficialActions::HazardDecision> OfficialActions::Verify(const Uuid& hazard,
+                                                                       const std::string& why,
+                                                                       std::int64_t now_ns) const {
+  const auto slot = state_.hazards.Find(hazard);
+  if (!slot) return std::nullopt;
+  HazardDecision decision{*slot, state_.hazards.Record(*slot).life, {}, {}, {}, 0};
+  decision.step = steps_.lifecycle().Doubt(steps_.ClassOf(*slot), why, now_ns, decision.life);
+  if (!decision.step.transition) return std::nullopt;
+  return decision;
+}
+
 std::uint64_t OfficialActions::Apply(const HazardDecision& decision, ZoneTransaction& transaction) {
   const std::int64_t now_ns = transaction.now_ns();
   std::map<std::uint64_t, double> suspicions;

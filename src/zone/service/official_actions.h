@@ -69,6 +69,10 @@ class OfficialActions {
   std::optional<HazardDecision> Undo(const Uuid& hazard, const std::string& official,
                                      const std::string& why, std::optional<std::uint64_t> meant,
                                      std::int64_t now_ns, Undone& undone) const;
+  /// What it means to verify the hazard (HazardLifecycle::Doubt), for the reason `why`; none where
+  /// drivers are not told of it.
+  std::optional<HazardDecision> Verify(const Uuid& hazard, const std::string& why,
+                                       std::int64_t now_ns) const;
   /// What it means to take the hazard off the map for good.
   std::optional<HazardDecision> Remove(const Uuid& hazard, const std::string& reason,
                                        std::int64_t now_ns) const;

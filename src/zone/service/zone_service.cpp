@@ -251,6 +251,11 @@ std::optional<std::uint64_t> ZoneService::Reject(const Uuid& hazard, const std::
       [&](std::int64_t now_ns) { return officials_.Reject(hazard, official, why, seen, now_ns); });
 }
 
+bool ZoneService::Verify(const Uuid& hazard, const std::string& why) {
+  return DecideHazard([&](std::int64_t now_ns) { return officials_.Verify(hazard, why, now_ns); })
+      .has_value();
+}
+
 bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
   return DecideHazard(
              [&](std::int64_t now_ns) { return officials_.Remove(hazard, reason, now_ns); })
@@ -503,12 +508,21 @@ std::vector<StoredEvent> ZoneService::Events(const Uuid& hazard, std::size_t lim
 }
 
 std::vector<DecisionRecord> ZoneService::Decisions(std::uint64_t before, std::size_t limit) const {
-  const ZoneStore* store = nullptr;
-  {
-    const ReaderLock lock(data_mutex_);
-    store = &StateForReaders().store;
-  }
-  return store->LoadAllDecisions(before, limit);
+  return HistoryStore().LoadAllDecisions(before, limit);
+}
+
+std::vector<DecisionRecord> ZoneService::DecisionsAfter(std::uint64_t id, std::size_t limit) const {
+  return HistoryStore().LoadDecisionsAfter(id, limit);
+}
+
+std::vector<StoredEvent> ZoneService::TurnsAfter(std::uint64_t sequence, std::size_t limit) const {
+  return HistoryStore().LoadTurnsAfter(sequence, limit);
+}
+
+/// For the functions of the store that any thread may call.
+const ZoneStore& ZoneService::HistoryStore() const {
+  const ReaderLock lock(data_mutex_);
+  return StateForReaders().store;
 }
 
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,

@@ -129,6 +129,11 @@ class ZoneService {
   /// The audit trail: the newest `limit` decisions of all officials whose id is below `before`, the
   /// newest first. Throws StoreError. Waits for no writer, unless one commits just now.
   std::vector<DecisionRecord> Decisions(std::uint64_t before, std::size_t limit) const;
+  /// The first `limit` decisions whose id is above `id`, in the order of their ids. As Decisions.
+  std::vector<DecisionRecord> DecisionsAfter(std::uint64_t id, std::size_t limit) const;
+  /// The first `limit` events above `sequence` by which drivers are told of a hazard of which they
+  /// were not, or by which it leaves the map, in the order of their sequence. As Decisions.
+  std::vector<StoredEvent> TurnsAfter(std::uint64_t sequence, std::size_t limit) const;
 
   /// An official's decisions; they return the decision's id. The same decision by the same official
   /// for the same reason returns the id of the one before, and changes nothing, while it holds.
@@ -174,6 +179,11 @@ class ZoneService {
   /// the vehicle. In pieces, as Distrust.
   std::optional<std::size_t> Trust(const std::string& vehicle_id, const std::string& official,
                                    const std::string& reason = "");
+
+  /// Somebody says that the hazard was repaired: one that drivers are told of is verified, so that
+  /// the next vehicles that pass are asked (HazardLifecycle::Doubt). False where there is none
+  /// such.
+  bool Verify(const Uuid& hazard, const std::string& why);
 
   /// Takes a hazard off the map for good. False when none of that uuid is on the map.
   bool Remove(const Uuid& hazard, const std::string& reason);
@@ -253,6 +263,7 @@ class ZoneService {
   std::optional<std::uint64_t> DecideMapChange(const Uuid& uuid, MapChangeState to,
                                                const std::string& official,
                                                const std::string& reason);
+  const ZoneStore& HistoryStore() const EXCLUDES(data_mutex_);
   bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
   std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);
   void CountAnswer(bool accepted) EXCLUDES(data_mutex_);

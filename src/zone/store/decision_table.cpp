@@ -116,21 +116,31 @@ std::vector<DecisionRecord> DecisionTable::LoadDecisions(const std::string& subj
 
 std::vector<DecisionRecord> DecisionTable::LoadAllDecisions(std::uint64_t before,
                                                             std::size_t limit) {
+  return LoadRange("id < :i ORDER BY id DESC", before, limit);
+}
+
+std::vector<DecisionRecord> DecisionTable::LoadDecisionsAfter(std::uint64_t after,
+                                                              std::size_t limit) {
+  return LoadRange("id > :i ORDER BY id", after, limit);
+}
+
+/// The first `limit` sound rows; `which` says which ones there are, by their id, and their order.
+std::vector<DecisionRecord> DecisionTable::LoadRange(const char* which, std::uint64_t id,
+                                                     std::size_t limit) {
   return ExplainStore("reading decisions", [&] {
     std::vector<DecisionRecord> decisions;
-    row_.below = static_cast<long long>(std::min<std::uint64_t>(before, kMaxSequence));
-    row_.limit = static_cast<long long>(limit);
+    row_.below = static_cast<long long>(std::min<std::uint64_t>(id, kMaxSequence));
     soci::statement find =
         (session_.prepare << "SELECT id, kind, subject, official, reason, at_ns, hazards, "
                              "undone_by, before, effects FROM decisions WHERE typeof(subject) = "
-                             "'text' AND length(CAST(subject AS BLOB)) <= 64 AND id < :b AND "
-                          << kSoundDecision << " ORDER BY id DESC LIMIT :l",
-         soci::use(row_.below), soci::use(row_.limit), soci::into(row_.id), soci::into(row_.kind),
+                             "'text' AND length(CAST(subject AS BLOB)) <= 64 AND "
+                          << kSoundDecision << " AND " << which,
+         soci::use(row_.below), soci::into(row_.id), soci::into(row_.kind),
          soci::into(row_.subject), soci::into(row_.official), soci::into(row_.reason),
          soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
          soci::into(row_.before), soci::into(row_.effects));
     find.execute();
-    while (find.fetch()) {
+    while (decisions.size() < limit && find.fetch()) {
       if (IsSound(row_) && protocol::IsPrintableText(row_.subject, kMaxStoredTextBytes)) {
         decisions.push_back(ToDecision());
       }

@@ -23,6 +23,7 @@ class DecisionTable {
   /// See the functions of ZoneStore with these names.
   std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);
   std::vector<DecisionRecord> LoadAllDecisions(std::uint64_t before, std::size_t limit);
+  std::vector<DecisionRecord> LoadDecisionsAfter(std::uint64_t after, std::size_t limit);
   std::optional<DecisionRecord> FindNewestDecision(const std::string& subject);
   std::optional<DecisionRecord> FindStandingDistrust(const std::string& vehicle_id,
                                                      std::uint64_t before);
@@ -43,6 +44,7 @@ class DecisionTable {
   };
 
   DecisionRecord ToDecision() const;
+  std::vector<DecisionRecord> LoadRange(const char* which, std::uint64_t id, std::size_t limit);
   std::optional<DecisionRecord> FindBelow(soci::statement& find, const std::string& subject,
                                           std::uint64_t before);
 

@@ -1,6 +1,8 @@
 #include "zone/store/event_log.h"
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "zone/store/event_walk.h"
 #include "zone/store/queries.h"
@@ -19,7 +21,8 @@ constexpr char kSoundEvent[] =
 }  // namespace
 
 EventLog::EventLog(soci::session& session)
-    : find_((session.prepare << "SELECT previous_sequence, action, from_state, to_state, "
+    : session_(session),
+      find_((session.prepare << "SELECT previous_sequence, action, from_state, to_state, "
                                 "announced <> 0, reason, at_ns FROM events WHERE sequence = :s AND "
                              << kSoundEvent,
              soci::use(row_.sequence), soci::into(row_.previous_sequence), soci::into(row_.action),
@@ -44,6 +47,36 @@ std::vector<StoredEvent> EventLog::Load(const Uuid& hazard, std::uint64_t sequen
       event->announced = read.announced != 0;
       return event;
     });
+  });
+}
+
+std::vector<StoredEvent> EventLog::LoadTurnsAfter(std::uint64_t sequence, std::size_t limit) {
+  return ExplainStore("reading what happened", [&] {
+    row_.sequence = static_cast<long long>(std::min<std::uint64_t>(sequence, kMaxSequence));
+    long long after = row_.sequence;
+    soci::statement find =
+        (session_.prepare << "SELECT e.sequence, substr(h.uuid, 1, 37), action, from_state, "
+                             "to_state, announced <> 0, reason, at_ns FROM events e JOIN hazards h "
+                             "ON h.id = e.hazard_id WHERE e.sequence > :s AND typeof(h.uuid) = "
+                             "'text' AND (to_state IN (3, 4) OR (to_state IN (1, 2) AND "
+                             "coalesce(from_state, 0) NOT IN (1, 2))) AND "
+                          << kSoundEvent << " ORDER BY e.sequence",
+         soci::use(after), soci::into(row_.sequence), soci::into(row_.hazard_uuid),
+         soci::into(row_.action), soci::into(row_.from_state, row_.has_from),
+         soci::into(row_.state), soci::into(row_.announced), soci::into(row_.reason),
+         soci::into(row_.updated_ns));
+    std::vector<StoredEvent> events;
+    find.execute();
+    while (events.size() < limit && find.fetch()) {
+      auto event = EventOf<StoredEvent>(row_, kHazardStates);
+      const auto hazard = Uuid::Parse(row_.hazard_uuid);
+      if (!event || !hazard || !IsIndex(row_.action, kActions)) continue;
+      event->hazard = *hazard;
+      event->action = static_cast<HazardAction>(row_.action);
+      event->announced = row_.announced != 0;
+      events.push_back(*std::move(event));
+    }
+    return events;
   });
 }
 

@@ -22,17 +22,20 @@ class EventLog {
 
   /// See ZoneStore::LoadEvents and WriteEvent.
   std::vector<StoredEvent> Load(const Uuid& hazard, std::uint64_t sequence, std::size_t limit);
+  /// See ZoneStore::LoadTurnsAfter.
+  std::vector<StoredEvent> LoadTurnsAfter(std::uint64_t sequence, std::size_t limit);
   void Write(const HazardEvent& event, std::uint64_t hazard_id, std::uint64_t previous_sequence);
 
  private:
   /// SOCI binds to places, not to values.
   struct Row {
-    std::string reason;
+    std::string reason, hazard_uuid;
     long long hazard_id = 0, sequence = 0, previous_sequence = 0, updated_ns = 0;
     int state = 0, action = 0, from_state = 0, announced = 0;
     soci::indicator has_from = soci::i_ok;
   };
 
+  soci::session& session_;
   Row row_;
   soci::statement find_;
   soci::statement write_;

@@ -44,6 +44,17 @@ class StoredHistories {
     return decisions_.LoadAllDecisions(before, limit);
   }
 
+  /// EventLog::LoadTurnsAfter. Throws as that does.
+  std::vector<StoredEvent> TurnsAfter(std::uint64_t sequence, std::size_t limit) {
+    const MutexLock lock(mutex_);
+    return events_.LoadTurnsAfter(sequence, limit);
+  }
+  /// DecisionTable::LoadDecisionsAfter. Throws as that does.
+  std::vector<DecisionRecord> DecisionsAfter(std::uint64_t id, std::size_t limit) {
+    const MutexLock lock(mutex_);
+    return decisions_.LoadDecisionsAfter(id, limit);
+  }
+
  private:
   static soci::session& OnlyReading(soci::session& session) {
     session << "PRAGMA query_only=ON";

@@ -152,6 +152,16 @@ std::vector<DecisionRecord> ZoneStore::LoadAllDecisions(std::uint64_t before,
   return implementation_->histories_.OfOfficials(before, limit);
 }
 
+std::vector<DecisionRecord> ZoneStore::LoadDecisionsAfter(std::uint64_t id,
+                                                          std::size_t limit) const {
+  return implementation_->histories_.DecisionsAfter(id, limit);
+}
+
+std::vector<StoredEvent> ZoneStore::LoadTurnsAfter(std::uint64_t sequence,
+                                                   std::size_t limit) const {
+  return implementation_->histories_.TurnsAfter(sequence, limit);
+}
+
 StoreDamage ZoneStore::LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take) {
   return implementation_->places_.Load(take);
 }

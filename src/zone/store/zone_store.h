@@ -33,9 +33,9 @@ struct Withdrawal {
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
 /// was learned of classes and of vehicles, where each vehicle was, and the same of map changes.
 /// SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
-/// Only LoadEvents and LoadMapChangeEvents may be called by any thread at any time: they read what
-/// is committed, over a connection of their own, so that nobody who reads a history keeps the
-/// writer waiting.
+/// Only those that say so, LoadEvents and LoadMapChangeEvents may be called by any thread at any
+/// time: they read what is committed, over a connection of their own, so that nobody who reads a
+/// history keeps the writer waiting.
 ///
 /// Every function throws StoreError with the database's own words when it fails.
 class ZoneStore {
@@ -101,6 +101,13 @@ class ZoneStore {
   /// The newest `limit` decisions of all officials whose id is below `before`, the newest first;
   /// broken rows are left out. Any thread may.
   std::vector<DecisionRecord> LoadAllDecisions(std::uint64_t before, std::size_t limit) const;
+  /// The first `limit` decisions whose id is above `id`, in the order of their ids; broken rows are
+  /// left out. Any thread may.
+  std::vector<DecisionRecord> LoadDecisionsAfter(std::uint64_t id, std::size_t limit) const;
+  /// The first `limit` events above `sequence` by which drivers are told of a hazard of which they
+  /// were not, or by which it leaves the map, in the order of their sequence; broken rows are left
+  /// out. Any thread may.
+  std::vector<StoredEvent> LoadTurnsAfter(std::uint64_t sequence, std::size_t limit) const;
   /// The newest `limit` decisions about a hazard, a map change or a vehicle
   /// (DecisionRecord::subject), the newest first; broken rows are left out.
   std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);

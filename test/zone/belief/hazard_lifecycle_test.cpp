@@ -57,6 +57,26 @@ TEST_F(HazardLifeTest, AnOfficialSuffices) {
   EXPECT_EQ(again.transition->reason, "confirmed by Bob: still there");
 }
 
+TEST_F(HazardLifeTest, WhatIsSaidToBeRepairedIsVerifiedAndGoesWhenTwoVehiclesDenyIt) {
+  Begin(1);
+  EXPECT_FALSE(rules_.Doubt(cone_, "closed", kStart, life_).transition) << "nobody is told of it";
+  rules_.Confirm(cone_, "Ada", "", kStart + kSecond, life_);
+  const LifecycleUpdate step = rules_.Doubt(cone_, "closed", kStart + 2 * kSecond, life_);
+  ASSERT_TRUE(step.transition);
+  EXPECT_EQ(step.transition->from, HazardState::kActive);
+  EXPECT_EQ(step.transition->to, HazardState::kVerifying);
+  EXPECT_EQ(step.transition->reason, "closed");
+  EXPECT_NEAR(Presence(kStart + 2 * kSecond), 0.5, 1e-6);
+  const PresenceRecord doubted = life_;
+  Say(EvidenceKind::kAnswerNo, 2, kStart + 60 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kVerifying);
+  Say(EvidenceKind::kAnswerNo, 3, kStart + 90 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kGone);
+  life_ = doubted;
+  See(2, kStart + 60 * kSecond);
+  EXPECT_EQ(life_.state, HazardState::kActive) << "it is still there";
+}
+
 TEST_F(HazardLifeTest, OneVehicleCannotConfirmHoweverMuchItSays) {
   Begin(1);
   std::mt19937_64 generator(5);
