@@ -48,7 +48,8 @@ zone::PictureLimits LimitsOf(const WebConfig& options) {
 }  // namespace
 
 Api::Api(const WebConfig& options, zone::ZoneService& zone,
-         const protocol::HazardCatalogue& catalogue, const VehicleTrails& trails)
+         const protocol::HazardCatalogue& catalogue, const VehicleTrails& trails,
+         orders::OrderDesk* orders)
     : options_(options),
       zone_(zone),
       catalogue_(catalogue),
@@ -60,6 +61,8 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       streets_(zone.streets()),
       feeds_(options_, zone, catalogue),
       ogc_(options_, zone, catalogue),
+      desk_(orders),
+      orders_(access_, orders),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
                 {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
@@ -158,6 +161,7 @@ HttpResponse Api::AnswerGet(const HttpRequest& question) {
     RefuseQueryParameters(target);
     return officials_.Preview(*decision, question);
   }
+  if (OrderApi::IsAddress(target.path)) return orders_.Answer(target, question);
   HttpResponse answer = Route(target, question);
   answer.by_official = access_.CheckOfficial(question);
   return answer;
@@ -171,6 +175,7 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     RefuseQueryParameters(target);
     return officials_.Decide(*decision, question);
   }
+  if (OrderApi::IsAddress(target.path)) return orders_.Answer(target, question);
   if (target.path == kSessionAddress) {
     RefuseQueryParameters(target);
     if (question.method == "POST") return access_.LogIn(question);
@@ -267,7 +272,7 @@ HttpResponse Api::Metrics() const {
   server.answers = answer_times_.counts();
   HttpResponse answer;
   answer.content_type = kMetricsType;
-  answer.content = ZoneMetricsText(zone_, server);
+  answer.content = ZoneMetricsText(zone_, server, desk_);
   answer.headers.emplace_back("Cache-Control", "no-store");
   return answer;
 }

@@ -15,6 +15,7 @@
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
 #include "web/api/official_api.h"
+#include "web/api/order_api.h"
 #include "web/api/query.h"
 #include "web/api/street_api.h"
 #include "web/api/vehicle_trails.h"
@@ -35,10 +36,10 @@ namespace livemap::web {
 /// (docs/reference/http-api.md) and the feeds (docs/reference/feeds.md). Thread-safe; never throws.
 class Api : public Site {
  public:
-  /// Keeps references to all but `options`. Throws Error when the token file, the accounts or the
-  /// file of tiles is not accepted.
+  /// Keeps references to all but `options`. `orders`: null where the zone has no work orders.
+  /// Throws Error when the token file, the accounts or the file of tiles is not accepted.
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
-      const VehicleTrails& trails);
+      const VehicleTrails& trails, orders::OrderDesk* orders = nullptr);
 
   /// From now on metrics tell what this says of the server, whose answers nobody else counts.
   void TellServer(std::function<ServerMetrics()> server);
@@ -93,6 +94,8 @@ class Api : public Site {
   const StreetApi streets_;
   const FeedApi feeds_;
   const OgcApi ogc_;
+  const orders::OrderDesk* const desk_;  ///< Null where the zone has no work orders.
+  OrderApi orders_;
   std::optional<TileFile> tiles_;
   DurationHistogram answer_times_;
   mutable Mutex server_mutex_;

@@ -12,6 +12,10 @@ constexpr std::array<zone::HazardState, zone::kHazardStates> kAllHazardStates{
     zone::HazardState::kCandidate, zone::HazardState::kActive, zone::HazardState::kVerifying,
     zone::HazardState::kGone, zone::HazardState::kRejected};
 
+constexpr std::array<orders::OrderState, orders::kOrderStates> kAllOrderStates{
+    orders::OrderState::kWaiting, orders::OrderState::kSent, orders::OrderState::kClosed,
+    orders::OrderState::kFailed, orders::OrderState::kCancelled};
+
 /// The sequence is a 63-bit number in the store.
 std::uint64_t ParseSequence(const std::string& text) {
   const auto number = WholeNumber(text);
@@ -34,6 +38,7 @@ std::size_t ParseLimit(const std::string& text, std::size_t most) {
 /// "a, b and c".
 const char* NameOfState(zone::HazardState state) { return zone::HazardStateName(state); }
 const char* NameOfState(zone::MapChangeState state) { return zone::MapChangeStateName(state); }
+const char* NameOfState(orders::OrderState state) { return orders::OrderStateName(state); }
 
 template <typename State, std::size_t kCount>
 std::string StateNames(const std::array<State, kCount>& all) {
@@ -154,6 +159,25 @@ DecisionsQuery ParseDecisionsQuery(const RequestTarget& target) {
       query.limit = ParseLimit(value, kMaxEventsPerAnswer);
     } else {
       RefuseUnknown(name, "accepted are before and limit");
+    }
+  }
+  return query;
+}
+
+OrdersQuery ParseOrdersQuery(const RequestTarget& target) {
+  RefuseRepeated(target);
+  OrdersQuery query;
+  for (const auto& [name, value] : target.parameters) {
+    if (name == "before") {
+      query.before = ParseSequence(value);
+    } else if (name == "limit") {
+      query.limit = ParseLimit(value, kMaxEventsPerAnswer);
+    } else if (name == "state") {
+      const auto states = ParseStates(value, kAllOrderStates);
+      if (states.size() > 1) throw BadRequest("state names several states, accepted is one");
+      query.state = *states.begin();
+    } else {
+      RefuseUnknown(name, "accepted are before, limit and state");
     }
   }
   return query;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "geo/geo_box.h"
+#include "orders/order.h"
 #include "web/http/request_target.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
@@ -80,6 +81,16 @@ struct DecisionsQuery {
 
 /// Reads `before` and `limit`; refuses every other parameter.
 DecisionsQuery ParseDecisionsQuery(const RequestTarget& target);
+
+/// What `GET /api/v1/orders` asks for.
+struct OrdersQuery {
+  std::uint64_t before = UINT64_MAX;        ///< Only orders with a lower number.
+  std::size_t limit = 100;                  ///< At most kMaxEventsPerAnswer.
+  std::optional<orders::OrderState> state;  ///< Only orders in this state; none: in any.
+};
+
+/// Reads `before`, `limit` and `state`; refuses every other parameter.
+OrdersQuery ParseOrdersQuery(const RequestTarget& target);
 
 /// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);

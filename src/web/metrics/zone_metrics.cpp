@@ -1,7 +1,10 @@
 #include "web/metrics/zone_metrics.h"
 
+#include <algorithm>
 #include <array>
 
+#include "common/clock.h"
+#include "common/time.h"
 #include "web/metrics/metrics_text.h"
 #include "zone/admission/report_validation.h"
 #include "zone/model/hazard_state.h"
@@ -108,9 +111,26 @@ void AddServer(MetricsText& text, const ServerMetrics& server) {
   text.Add(server.answers);
 }
 
+void AddOrders(MetricsText& text, const orders::OrderDesk& desk) {
+  const orders::OrderCounts counts = desk.Counts();
+  text.Begin("livemap_work_orders", kGauge, "Work orders, by state.");
+  AddByKind(text, "state", orders::OrderStateName, counts.by_state);
+  const bool waits = counts.oldest_waiting_ns != 0;
+  AddOne(text, "livemap_work_order_oldest_seconds", kGauge,
+         "Age of the oldest work order that waits to be sent; 0: none waits.",
+         waits ? std::max(0.0, Seconds(SystemNs() - counts.oldest_waiting_ns)) : 0);
+  const auto attempts = desk.attempts();
+  text.Begin("livemap_work_order_attempts_total", kCounter,
+             "Attempts to send a work order, by what became of them.");
+  text.Add("outcome", "sent", static_cast<double>(attempts[0]));
+  text.Add("outcome", "refused", static_cast<double>(attempts[1]));
+  text.Add("outcome", "unknown", static_cast<double>(attempts[2]));
+}
+
 }  // namespace
 
-std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server) {
+std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server,
+                            const orders::OrderDesk* orders) {
   const zone::ZoneStatistics statistics = zone.Statistics();
   MetricsText text;
   AddReports(text, statistics);
@@ -118,6 +138,7 @@ std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& 
   AddMap(text, zone, statistics);
   AddStore(text, zone, statistics);
   AddServer(text, server);
+  if (orders != nullptr) AddOrders(text, *orders);
   return text.text();
 }
 

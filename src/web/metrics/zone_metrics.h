@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/histogram.h"
+#include "orders/desk/order_desk.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {
@@ -18,8 +19,10 @@ struct ServerMetrics {
   DurationHistogram::Counts answers;  ///< Time from a request to its answer, without pictures.
 };
 
-/// All metrics of the zone (docs/reference/metrics.md), in the text format of Prometheus. No metric
-/// names a vehicle or a place.
-std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server);
+/// All metrics of the zone, with those of its work orders where it has some (`orders` is not null)
+/// (docs/reference/metrics.md), in the text format of Prometheus. No metric names a vehicle or a
+/// place.
+std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server,
+                            const orders::OrderDesk* orders = nullptr);
 
 }  // namespace livemap::web

@@ -11,9 +11,9 @@ namespace livemap::web {
 class WebServer::Implementation {
  public:
   Implementation(const Options& options, zone::ZoneService& zone,
-                 const protocol::HazardCatalogue& catalogue)
+                 const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders)
       : hub_(zone, catalogue, trails_),
-        api_(options, zone, catalogue, trails_),
+        api_(options, zone, catalogue, trails_, orders),
         live_{zone, catalogue, hub_},
         server_(options, api_, &live_) {
     api_.TellServer([this] {
@@ -44,9 +44,9 @@ class WebServer::Implementation {
 };
 
 WebServer::WebServer(const Options& options, zone::ZoneService& zone,
-                     const protocol::HazardCatalogue& catalogue) {
+                     const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders) {
   Validate(options);
-  implementation_ = std::make_unique<Implementation>(options, zone, catalogue);
+  implementation_ = std::make_unique<Implementation>(options, zone, catalogue, orders);
 }
 
 WebServer::~WebServer() = default;

@@ -17,10 +17,11 @@ class WebServer {
  public:
   using Options = WebConfig;
 
-  /// Listens and serves from its own threads when it returns. Keeps references to `zone` and
-  /// `catalogue`. Throws Error when an option is not accepted or the port cannot be opened.
+  /// Listens and serves from its own threads when it returns. Keeps references to `zone`,
+  /// `catalogue` and `orders` (null: the zone has no work orders). Throws Error when an option is
+  /// not accepted or the port cannot be opened.
   WebServer(const Options& options, zone::ZoneService& zone,
-            const protocol::HazardCatalogue& catalogue);
+            const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders = nullptr);
   /// Closes every connection and joins the threads.
   ~WebServer();
   WebServer(const WebServer&) = delete;
