@@ -1,5 +1,7 @@
 #include "zone/store/report_log.h"
 
+#include <algorithm>
+
 #include "protocol/poll.h"
 #include "zone/store/queries.h"
 
@@ -23,6 +25,11 @@ ReportLog::ReportLog(soci::session& session)
            soci::use(row_.confidence), soci::use(row_.latitude), soci::use(row_.longitude),
            soci::use(row_.covariance_ee), soci::use(row_.covariance_en),
            soci::use(row_.covariance_nn), soci::use(row_.image_sha256))),
+      write_box_((session.prepare << "INSERT INTO report_boxes (hazard_id, image_sha256, box_left, "
+                                     "box_top, box_right, box_bottom) VALUES (:h, :i, :l, :t, :r, "
+                                     ":b)",
+                  soci::use(row_.hazard_id), soci::use(row_.image_sha256), soci::use(row_.box_left),
+                  soci::use(row_.box_top), soci::use(row_.box_right), soci::use(row_.box_bottom))),
       write_answer_((session.prepare
                          << "INSERT INTO answers (poll_uuid, hazard_id, vehicle_id, answer, "
                             "reason, confidence, "
@@ -56,7 +63,23 @@ void ReportLog::WriteReport(const protocol::Report& report, std::uint64_t hazard
     row_.covariance_nn = report.covariance_m2(1, 1);
     row_.image_sha256 = image_sha256;
     write_report_.execute(true);
+    if (!image_sha256.empty()) WriteBox(report);
   });
+}
+
+/// Of the row's hazard and picture, as far as the picture shows it.
+void ReportLog::WriteBox(const protocol::Report& report) {
+  imaging::PixelRegion shown = report.shown;
+  if (shown.IsWholeImage()) shown = {0, 0, report.image_width, report.image_height};
+  const auto share = [](float edge, std::uint32_t begin, std::uint32_t size) {
+    return std::clamp((static_cast<double>(edge) - begin) / size, 0.0, 1.0);
+  };
+  row_.box_left = share(report.box.x_min, shown.x, shown.width);
+  row_.box_top = share(report.box.y_min, shown.y, shown.height);
+  row_.box_right = share(report.box.x_max, shown.x, shown.width);
+  row_.box_bottom = share(report.box.y_max, shown.y, shown.height);
+  const bool is_shown = row_.box_left < row_.box_right && row_.box_top < row_.box_bottom;
+  if (is_shown) write_box_.execute(true);
 }
 
 void ReportLog::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,

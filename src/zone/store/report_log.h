@@ -32,13 +32,17 @@ class ReportLog {
     std::string uuid, hazard_uuid, vehicle_id, drive_id, image_sha256, reason;
     double confidence = 0, latitude = 0, longitude = 0;
     double covariance_ee = 0, covariance_en = 0, covariance_nn = 0;
+    double box_left = 0, box_top = 0, box_right = 0, box_bottom = 0;
     long long hazard_id = 0, stamp_ns = 0, received_ns = 0;
     int answer = 0;
   };
 
+  void WriteBox(const protocol::Report& report);
+
   Row row_;
   soci::statement find_report_;
   soci::statement write_report_;
+  soci::statement write_box_;
   soci::statement write_answer_;
 };
 

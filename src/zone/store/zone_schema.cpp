@@ -276,6 +276,22 @@ const Statements& ZoneSchemaToVersion6() {
   return kStatements;
 }
 
+/// Where in the pictures of reports the hazards are, edges in shares of the picture. Pictures of
+/// before have no box.
+const Statements& ZoneSchemaToVersion7() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS report_boxes (
+           id INTEGER PRIMARY KEY,
+           hazard_id INTEGER NOT NULL,
+           image_sha256 VARCHAR(64) NOT NULL,
+           box_left DOUBLE PRECISION NOT NULL,
+           box_top DOUBLE PRECISION NOT NULL,
+           box_right DOUBLE PRECISION NOT NULL,
+           box_bottom DOUBLE PRECISION NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (7)"};
+  return kStatements;
+}
+
 int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -298,7 +314,8 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
   }
   const std::array<const Statements*, kZoneSchemaVersion> steps{
       &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
-      &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6()};
+      &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6(),
+      &ZoneSchemaToVersion7()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;
