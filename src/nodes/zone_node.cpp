@@ -87,8 +87,15 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   teller_ = std::make_unique<CatchUpPublisher>(
       zone_, pictures_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000), telling);
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
+  if (!config_.work_orders.empty()) {
+    orders_ = std::make_unique<orders::OrderDesk>(
+        orders::ReadWorkOrderFile(config_.work_orders), config_.zone.directory, zone_,
+        config_.zone.catalogue, SystemNs, EntropySeededGenerator()(),
+        [](const std::string& line) { ROS_WARN("%s", line.c_str()); });
+  }
   if (config_.web) {
-    web_ = std::make_unique<web::WebServer>(config_.web_options, zone_, config_.zone.catalogue);
+    web_ = std::make_unique<web::WebServer>(config_.web_options, zone_, config_.zone.catalogue,
+                                            orders_.get());
     private_node.setParam("/livemap/web_port", web_->port());
   }
   subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { OnEvent(event); });

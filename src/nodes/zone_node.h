@@ -21,6 +21,7 @@
 #include "nodes/catch_up_publisher.h"
 #include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
+#include "orders/desk/order_desk.h"
 #include "ros/conversions/zone_conversions.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 #include "web/server/web_server.h"
@@ -35,7 +36,7 @@ namespace livemap::nodes {
 /// changes, poll answers and orders to tell single vehicles what they missed into the worker's
 /// inbox, which wakes it. The worker thread commits what waits in groups, answers with receipts,
 /// tells vehicles, lets time pass and asks polls; NoticeSender's thread tells everybody what is
-/// announced.
+/// announced, and the threads of OrderDesk send work orders.
 class ZoneNode {
  public:
   /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
@@ -95,6 +96,7 @@ class ZoneNode {
   std::vector<ros::SteadyTimer> timers_;
   diagnostic_updater::Updater updater_;
   int subscription_ = 0;
+  std::unique_ptr<orders::OrderDesk> orders_;  ///< Null: the zone has no work orders.
   std::unique_ptr<web::WebServer> web_;
   std::thread worker_;
 };

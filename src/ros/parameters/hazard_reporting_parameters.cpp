@@ -111,6 +111,10 @@ void ReadReportingPicture(ParameterReader& parameters, HazardReportingConfig& co
   parameters.Read("picture_context", reporter.picture.context, {0, 100},
                   "The picture shows this many times the box's sides, at least 240 x 160 pixels. "
                   "0: the whole image.");
+  parameters.Read("draw_boxes", config.draw_boxes,
+                  "Draw the boxes of what was found into the pictures. false: they are plain, as "
+                  "training wants those of ./livemap zone export-labels; officials then see the "
+                  "hazard without its box.");
   parameters.Section("Faces and number plates");
   ReadPrivacy(parameters, config.privacy, config.mask,
               "Mask faces and number plates in every picture of a report and of an answer. With "

@@ -18,6 +18,7 @@ struct HazardReportingConfig {
   vehicle::PollResponder::Config polls;
   vehicle::PictureWorker::Config pictures;
   int picture_frames = 64;  ///< Images that may be wanted.
+  bool draw_boxes = true;   ///< Into the pictures, before they are cut out.
   bool privacy = true;      ///< Mask faces and number plates in all pictures.
   perception::PrivacyMask::Config mask;
   std::string catalogue;   ///< Path of hazards.yaml; empty: the package's own.

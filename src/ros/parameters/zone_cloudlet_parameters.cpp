@@ -281,6 +281,14 @@ void ReadZoneStreets(ParameterReader& parameters, ZoneCloudletConfig& config) {
                   "this. zone.launch sets it by the argument `streets`.");
 }
 
+void ReadZoneOrders(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  parameters.Section("Work orders", "docs/how-to/send-work-orders.md.");
+  parameters.Read("work_orders", config.work_orders,
+                  "Path of the file that says which hazards become work orders, and to whom they "
+                  "are sent (docs/reference/work-orders.md). Empty: none. zone.launch sets it by "
+                  "the argument `work_orders`.");
+}
+
 void ReadZoneMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
   parameters.Section("rviz");
   parameters.Read("map_frame", config.map_frame, "Frame of hazard/markers: x east, y north.");
@@ -406,6 +414,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   ReadZoneLife(parameters, config.zone);
   ReadZonePolls(parameters, config.zone);
   ReadZoneStreets(parameters, config);
+  ReadZoneOrders(parameters, config);
   ReadZoneMarkers(parameters, config);
   ReadZoneWeb(parameters, package_path, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.

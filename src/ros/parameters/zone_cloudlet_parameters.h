@@ -13,8 +13,9 @@ namespace livemap::ros_io {
 
 /// Defaults of the zone_cloudlet node; the reader states their meanings.
 struct ZoneCloudletConfig {
-  std::string hazards;  ///< Path of the catalogue; empty: config/hazards.yaml.
-  std::string streets;  ///< Extract of OpenStreetMap; empty: the zone knows no streets.
+  std::string hazards;      ///< Path of the catalogue; empty: config/hazards.yaml.
+  std::string streets;      ///< Extract of OpenStreetMap; empty: the zone knows no streets.
+  std::string work_orders;  ///< File of recipients and rules; empty: the zone has no work orders.
   zone::ZoneService::Config zone;
   int batch_reports = 500;                 ///< Most reports of one commit.
   int queue_reports = 20000;               ///< Waiting for a commit; beyond it they are not taken.
