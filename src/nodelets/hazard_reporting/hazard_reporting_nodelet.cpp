@@ -85,8 +85,8 @@ class HazardReportingPart : public NodeletPart {
     reporter_ = std::make_unique<vehicle::HazardReporter>(
         config_.reporter, catalogue_, EntropySeededGenerator(), now_ns, SteadyS());
     responder_ = std::make_unique<vehicle::PollResponder>(config_.polls, catalogue_);
-    maker_ =
-        std::make_unique<PictureMaker>(MakeMaskerConfig(config_.privacy, config_.mask), getName());
+    maker_ = std::make_unique<PictureMaker>(MakeMaskerConfig(config_.privacy, config_.mask),
+                                            getName(), config_.draw_boxes);
     SayWhatFindsFaces(getName(), maker_->masker());
     images_ =
         std::make_unique<RecentImages<Kept>>(static_cast<std::size_t>(config_.picture_frames));

@@ -46,8 +46,9 @@ cv::Rect ToRect(const imaging::PixelRegion& part, const cv::Mat& bgr) {
 
 }  // namespace
 
-PictureMaker::PictureMaker(const perception::PictureMasker::Config& config, std::string log_name)
-    : log_name_(std::move(log_name)), masker_(config) {}
+PictureMaker::PictureMaker(const perception::PictureMasker::Config& config, std::string log_name,
+                           bool draws_boxes)
+    : log_name_(std::move(log_name)), draws_boxes_(draws_boxes), masker_(config) {}
 
 std::vector<imaging::CroppedPicture> PictureMaker::Make(const vehicle::PictureOrder& order) {
   const cv::Mat& bgr = order.image.picture.bgr;
@@ -64,7 +65,9 @@ std::vector<imaging::CroppedPicture> PictureMaker::Make(const vehicle::PictureOr
   }
   // Without privacy these are the camera's pixels, which others look at.
   if (masked.bgr.data == bgr.data) masked.bgr = bgr.clone();
-  perception::AnnotateImage(masked.bgr, ToDetections(order.image.sightings, bgr.size()));
+  if (draws_boxes_) {
+    perception::AnnotateImage(masked.bgr, ToDetections(order.image.sightings, bgr.size()));
+  }
   return vehicle::CutPictures(order, masked.bgr);
 }
 

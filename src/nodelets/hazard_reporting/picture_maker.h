@@ -19,8 +19,9 @@ namespace livemap::nodelets {
 class PictureMaker {
  public:
   /// Throws Error when a detector of faces or plates cannot be loaded. `log_name` stands before
-  /// what is said of withheld pictures.
-  PictureMaker(const perception::PictureMasker::Config& config, std::string log_name);
+  /// what is said of withheld pictures. `draws_boxes`: false for pictures to train on.
+  PictureMaker(const perception::PictureMasker::Config& config, std::string log_name,
+               bool draws_boxes = true);
 
   /// An image came from the camera, whether or not a picture of it is wanted. Its number.
   std::uint64_t CountFrame() { return masker_.CountFrame(); }
@@ -33,6 +34,7 @@ class PictureMaker {
 
  private:
   const std::string log_name_;
+  const bool draws_boxes_;
   perception::PictureMasker masker_;
 };
 

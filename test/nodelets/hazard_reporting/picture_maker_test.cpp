@@ -93,6 +93,15 @@ TEST(PictureMaker, TheBoxesAreDrawn) {
   EXPECT_GT(red(drawn.at(0)), red(plain.at(0)) + 15);
 }
 
+TEST(PictureMaker, PicturesToTrainOnShowNoBoxes) {
+  PictureMaker maker(perception::PictureMasker::Config{}, "test", false);
+  vehicle::PictureOrder order = About({100, 200, 160, 240});
+  order.image.picture.bgr = cv::Mat(400, 640, CV_8UC3, cv::Scalar::all(120));
+  const auto plain = maker.Make(order);
+  order.image.sightings = {{"pothole", 0.8F, {100, 200, 160, 240}}};
+  EXPECT_EQ(maker.Make(order).at(0).jpeg, plain.at(0).jpeg);
+}
+
 TEST(PictureMaker, AnImageThatCannotBeMaskedMakesNoPicture) {
   ros::Time::init();  // Of the log.
   PictureMaker maker(perception::PictureMasker::Config{}, "test");
