@@ -46,7 +46,7 @@ FeedHead SampleHead() {
           kNewYearNs};
 }
 
-std::string Written(FeedFormat& format, const FeedHazard& hazard) {
+std::string WholeFeed(FeedFormat& format, const FeedHazard& hazard) {
   std::string text;
   format.Begin(SampleHead(), text);
   format.Add(hazard, text);
@@ -74,7 +74,7 @@ TEST(FeedCodes, AllShippedClassesHaveTheirOwn) {
 
 TEST(CsvFeed, HasALineOfAsManyFieldsAsTheHeader) {
   CsvFeed feed;
-  const std::string text = Written(feed, SampleHazard());
+  const std::string text = WholeFeed(feed, SampleHazard());
   const std::size_t end = text.find("\r\n");
   const std::string header = text.substr(0, end);
   EXPECT_THAT(text, testing::HasSubstr(",40.4433000,-79.9436000,2.0,"));
@@ -87,19 +87,19 @@ TEST(CsvFeed, GuardsTextsOfTheDatabase) {
   FeedHazard hazard = SampleHazard();
   hazard.words.street = "=cmd|' /C calc'!A0";
   CsvFeed feed;
-  EXPECT_THAT(Written(feed, hazard), testing::HasSubstr(",\"'=cmd|' /C calc'!A0\","));
+  EXPECT_THAT(WholeFeed(feed, hazard), testing::HasSubstr(",\"'=cmd|' /C calc'!A0\","));
 }
 
 TEST(GpxFeed, HasAWaypoint) {
   GpxFeed feed;
-  EXPECT_THAT(Written(feed, SampleHazard()),
+  EXPECT_THAT(WholeFeed(feed, SampleHazard()),
               testing::HasSubstr("<wpt lat=\"40.4433000\" lon=\"-79.9436000\">"
                                  "<time>2026-01-01T00:01:00Z</time><name>deer</name>"));
 }
 
 TEST(GeoRssFeed, SaysLatitudeFirst) {
   GeoRssFeed feed;
-  const std::string text = Written(feed, SampleHazard());
+  const std::string text = WholeFeed(feed, SampleHazard());
   EXPECT_THAT(text, testing::HasSubstr("<georss:point>40.4433000 -79.9436000</georss:point>"));
   EXPECT_THAT(text, testing::HasSubstr("<id>https://map.example/feeds/x?a=1&amp;b=2</id>"));
   EXPECT_THAT(text, testing::HasSubstr("City &amp; Sons"));
@@ -112,7 +112,7 @@ TEST(XmlFeeds, ScriptsInTextsStayTexts) {
   GeoRssFeed georss;
   DatexFeed datex;
   for (FeedFormat* feed : std::initializer_list<FeedFormat*>{&gpx, &georss, &datex}) {
-    const std::string text = Written(*feed, hazard);
+    const std::string text = WholeFeed(*feed, hazard);
     EXPECT_THAT(text, testing::Not(testing::HasSubstr("<script>")));
     EXPECT_THAT(text, testing::Not(testing::HasSubstr("\xff")));
     EXPECT_THAT(text, testing::HasSubstr("&lt;script&gt;"));
@@ -121,7 +121,7 @@ TEST(XmlFeeds, ScriptsInTextsStayTexts) {
 
 TEST(CifsFeed, HasALineInTheDirectionOfTravelLatitudeFirst) {
   CifsFeed feed;
-  const auto json = nlohmann::json::parse(Written(feed, SampleHazard()));
+  const auto json = nlohmann::json::parse(WholeFeed(feed, SampleHazard()));
   const auto& incident = json["incidents"][0]["incident"];
   EXPECT_EQ(incident["type"], "HAZARD");
   EXPECT_EQ(incident["subtype"], "HAZARD_ON_SHOULDER_ANIMALS");
@@ -139,7 +139,7 @@ TEST(CifsFeed, WithoutACourseBothDirectionsCount) {
   hazard.hazard.course_rad = std::nan("");
   hazard.words = {};
   CifsFeed feed;
-  const auto json = nlohmann::json::parse(Written(feed, hazard));
+  const auto json = nlohmann::json::parse(WholeFeed(feed, hazard));
   const auto& incident = json["incidents"][0]["incident"];
   EXPECT_EQ(incident["type"], "ACCIDENT");
   EXPECT_FALSE(incident.contains("subtype"));
@@ -151,7 +151,7 @@ TEST(CifsFeed, WithoutACourseBothDirectionsCount) {
 TEST(DatexFeed, HasTheRecordOfItsCategory) {
   const auto record_of = [](const std::string& class_name) {
     DatexFeed feed;
-    return Written(feed, SampleHazard(class_name));
+    return WholeFeed(feed, SampleHazard(class_name));
   };
   EXPECT_THAT(record_of("deer"),
               testing::HasSubstr("<sit:animalPresenceType>wildAnimalsOnTheRoad<"));
@@ -214,7 +214,7 @@ TEST(DenmFeed, WhatIsNotKnownIsUnavailable) {
 TEST(WzdxFeed, MakesAWorkZone) {
   WzdxFeed feed;
   FeedHazard sign = SampleHazard("road_work_sign");
-  const auto json = nlohmann::json::parse(Written(feed, sign));
+  const auto json = nlohmann::json::parse(WholeFeed(feed, sign));
   EXPECT_EQ(json["feed_info"]["publisher"], "City & Sons");
   ASSERT_EQ(json["features"].size(), 1U);
   const auto& zone = json["features"][0];
@@ -230,7 +230,7 @@ TEST(WzdxFeed, MakesAWorkZone) {
 
 TEST(WzdxFeed, WithoutWorkItIsEmpty) {
   WzdxFeed feed;
-  EXPECT_EQ(nlohmann::json::parse(Written(feed, SampleHazard("pothole")))["features"].size(), 0U);
+  EXPECT_EQ(nlohmann::json::parse(WholeFeed(feed, SampleHazard("pothole")))["features"].size(), 0U);
 }
 
 }  // namespace
