@@ -104,7 +104,7 @@ std::optional<std::int64_t> ParseTime(std::string_view text) {
     const int hours = reader.Number(2, 0, 23);
     reader.OneOf(":");
     const int minutes = reader.Number(2, 0, 59);
-    offset_s = (hours * 60 + minutes) * (zone == '+' ? 60 : -60);
+    offset_s = std::int64_t{hours * 60 + minutes} * (zone == '+' ? 60 : -60);
   }
   if (!reader.IsDone() || day > DaysOfMonth(year, month)) return std::nullopt;
   const std::int64_t seconds =

@@ -46,7 +46,7 @@ Json ConfidenceEllipse(const Eigen::Matrix2d& covariance_m2) {
                {"semiMajorOrientation", kUnavailableHeading}};
   if (!covariance_m2.allFinite()) return ellipse;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance_m2);
-  const Eigen::Vector2d variances = solver.eigenvalues();
+  const Eigen::Vector2d& variances = solver.eigenvalues();
   if (!(variances(1) > 0) || variances(0) < 0) return ellipse;
   const Eigen::Vector2d axis = solver.eigenvectors().col(1);
   ellipse["semiMajorConfidence"] = SemiAxis(std::sqrt(variances(1)));
