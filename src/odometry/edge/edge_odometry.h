@@ -188,6 +188,7 @@ class EdgeOdometry {
   bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
                     const VoResult& result);
   bool SelectPoints(Keyframe& keyframe);
+  double SelectPointsOf(int level, Keyframe& keyframe);
   Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
   AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);
   const EdgePoints& PointsOf(Keyframe& keyframe, int level);
