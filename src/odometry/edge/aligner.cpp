@@ -16,6 +16,7 @@ constexpr double kMinVisibleShare = 0.1;
 constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
+constexpr double kCoarser = 3;  // Than a fine alignment, in what has converged.
 constexpr float kNearestM = 0.01F;
 constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
 constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
@@ -156,8 +157,9 @@ void Aligner::FitGain(const EdgePoints& points, double sigma, AlignmentState& st
     const auto grey = AlignerPart(points.intensity, begin, count) - kMiddleGrey;
     Chunk weight, seen;
     const auto factor = AlignerPart(whitening_, begin, count);
-    weight.head(n) =
-        AlignerPart(current_.visible, begin, count) * factor.square() * (k / residual.abs().max(k));
+    // Squares of what is foreign must not count for more than others.
+    weight.head(n) = AlignerPart(current_.visible, begin, count) * factor.square() *
+                     (k / residual.abs().max(k)).square();
     seen.head(n) = residual / factor;
     seen.head(n) += gain * grey + (bias + (gain - 1) * kMiddleGrey);
     weights += static_cast<double>(weight.head(n).sum());
@@ -283,17 +285,20 @@ bool Aligner::Solve(double damping, Step& step) const {
   return step.allFinite();
 }
 
-/// Equation (8). The twist was solved for times the gain.
+/// Equation (8). The twist was solved for times the gain, the one that goes with it.
 AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) const {
   AlignmentState moved = state;
-  moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / state.gain);
   moved.gain = std::clamp(state.gain + step[6], kMinGain, 1 / kMinGain);
   moved.bias += step[7];
+  moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / moved.gain);
   return moved;
 }
 
 AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
-                               const geo::CameraIntrinsics& camera, const AlignmentState& start) {
+                               const geo::CameraIntrinsics& camera, const AlignmentState& start,
+                               Precision precision) {
+  const double converged_px =
+      config_.converged_px * (precision == Precision::kCoarse ? kCoarser : 1);
   AlignmentResult result;
   result.state = start;
   result.points = points.size();
@@ -320,7 +325,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
         camera.fx * (step.head<3>().norm() * points.mean_inverse_depth + step.segment<3>(3).norm());
     if (!(new_cost < cost)) {
       damping = std::max(kFirstDamping, damping * 10);
-      if (damping > kLastDamping || pixels < config_.converged_px) break;
+      if (damping > kLastDamping || pixels < converged_px) break;
       continue;
     }
     result.state = moved;
@@ -333,7 +338,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
     cost = RobustCost(current_, sigma);
     damping = damping > kFirstDamping ? damping / 10 : 0;
     stale = true;
-    if (pixels < config_.converged_px) break;
+    if (pixels < converged_px) break;
   }
   if (stale) BuildNormalEquations(points, sigma);
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);

@@ -33,6 +33,9 @@ struct AlignmentConfig {
   bool rotation_only = false;
 };
 
+/// How far an alignment goes: one that a finer level takes up need not be exact.
+enum class Precision { kFine, kCoarse };
+
 struct AlignmentResult {
   AlignmentState state;
   /// Inverse covariance of the right-hand perturbation delta: new_from_reference * Exp(delta), for
@@ -73,7 +76,8 @@ class Aligner {
 
   /// Aligns on one level from `start` on.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
-                        const geo::CameraIntrinsics& camera, const AlignmentState& start);
+                        const geo::CameraIntrinsics& camera, const AlignmentState& start,
+                        Precision precision = Precision::kFine);
 
   /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
   /// less than a tenth of the points is visible.

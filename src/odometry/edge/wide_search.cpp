@@ -161,12 +161,12 @@ void WideSearch::Weigh(const EdgePoints& points, const cv::Mat& grey, int level)
 
 /// Aligns the candidates on a level and keeps the best that differ.
 void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
-                        const Plausibility& plausibility) {
+                        Precision precision, const Plausibility& plausibility) {
   const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
-    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
+    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state, precision);
     const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
     candidate.score = IsBelievableMove(motion, points.mean_inverse_depth)
                           ? ExplainedScore(candidate.result) * plausibility(motion)
@@ -201,7 +201,9 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   double mean_inverse_depth = 0;
   for (int level = cameras_.levels - 1; level >= reference.finest_level; --level) {
     const EdgePoints& points = reference.points_of(level);
-    Refine(points, images[level], level, reference.plausibility);
+    Refine(points, images[level], level,
+           level > reference.finest_level ? Precision::kCoarse : Precision::kFine,
+           reference.plausibility);
     mean_inverse_depth = points.mean_inverse_depth;
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
   }

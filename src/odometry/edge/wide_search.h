@@ -97,7 +97,7 @@ class WideSearch {
     double likeness = 1;  ///< See Weigh().
   };
 
-  void Refine(const EdgePoints& points, const cv::Mat& grey, int level,
+  void Refine(const EdgePoints& points, const cv::Mat& grey, int level, Precision precision,
               const Plausibility& plausibility);
   void Weigh(const EdgePoints& points, const cv::Mat& grey, int level);
 
