@@ -12,10 +12,10 @@
 #include "protocol/report.h"
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/model/map_change.h"
+#include "zone/places/place_book.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_transaction.h"
-#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 

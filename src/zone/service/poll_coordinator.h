@@ -11,13 +11,13 @@
 #include "zone/model/vehicle_state.h"
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/picture_allowance.h"
+#include "zone/places/place_book.h"
 #include "zone/polling/poll_scheduler.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_transaction.h"
-#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 

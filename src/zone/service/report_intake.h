@@ -14,13 +14,13 @@
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/picture_allowance.h"
+#include "zone/places/place_book.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
 #include "zone/service/zone_transaction.h"
-#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 

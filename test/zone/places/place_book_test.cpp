@@ -1,4 +1,4 @@
-#include "zone/store/place_book.h"
+#include "zone/places/place_book.h"
 
 #include <gtest/gtest.h>
 
