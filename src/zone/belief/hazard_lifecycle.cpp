@@ -308,6 +308,15 @@ LifecycleUpdate HazardLifecycle::Doubt(const ClassModel& entry, const std::strin
   return step;
 }
 
+LifecycleUpdate HazardLifecycle::Close(const ClassModel& entry, const std::string& official,
+                                       const std::string& reason, std::int64_t now_ns,
+                                       PresenceRecord& life) const {
+  LifecycleUpdate step = Reject(entry, official, reason, now_ns, life);
+  step.verdicts.clear();
+  if (step.transition) step.transition->reason = DecisionText("repaired", official, reason);
+  return step;
+}
+
 LifecycleUpdate HazardLifecycle::Withdraw(const ClassModel& entry, std::uint64_t vehicle,
                                           const std::string& why, std::int64_t now_ns,
                                           PresenceRecord& life) const {

@@ -105,6 +105,10 @@ class HazardLifecycle {
   LifecycleUpdate Reject(const ClassModel& entry, const std::string& official,
                          const std::string& reason, std::int64_t now_ns,
                          PresenceRecord& life) const;
+  /// As Reject, but the official says that it was there and is repaired: nobody is judged, and
+  /// nothing is learned of how long its class lasts by itself.
+  LifecycleUpdate Close(const ClassModel& entry, const std::string& official,
+                        const std::string& reason, std::int64_t now_ns, PresenceRecord& life) const;
   /// Somebody who should know says that it was repaired, which nobody has looked at: a hazard that
   /// drivers are told of is verified, as likely there as not. That no longer counts as an
   /// official's confirmation. Judges nobody. No transition for any other hazard.

@@ -17,12 +17,29 @@ enum class DecisionKind : std::uint8_t {
   kConfirmMapChange = 2,
   kDismissMapChange = 3,
   kDistrustVehicle = 4,
-  kUndo = 5,          ///< Of the newest decision about a hazard or a map change.
-  kTrustVehicle = 6,  ///< Takes all distrust of a vehicle back.
+  kUndo = 5,            ///< Of the newest decision about a hazard or a map change.
+  kTrustVehicle = 6,    ///< Takes all distrust of a vehicle back.
+  kComment = 7,         ///< The reason is the comment.
+  kAssign = 8,          ///< To a team, or to none.
+  kCloseHazard = 9,     ///< It was there and is repaired.
+  kReclassHazard = 10,  ///< It is of another class.
+  kMoveHazard = 11,     ///< It lies elsewhere.
+  kMergeHazard = 12,    ///< Another hazard is the same one, and gone from the map.
 };
-constexpr std::size_t kDecisionKinds = 7;
+constexpr std::size_t kDecisionKinds = 13;
 
-/// "confirm", "reject", "confirm", "dismiss", "distrust", "undo" or "trust".
+/// A decision's text, a comment's above all, has at most so many bytes of valid UTF-8.
+constexpr std::size_t kMaxDecisionTextBytes = 500;
+
+/// Whether the decision leaves alone whether the hazard is there (HazardDesk).
+constexpr bool IsOfDesk(DecisionKind kind) {
+  return kind == DecisionKind::kComment || kind == DecisionKind::kAssign ||
+         kind == DecisionKind::kReclassHazard || kind == DecisionKind::kMoveHazard ||
+         kind == DecisionKind::kMergeHazard;
+}
+
+/// "confirm", "reject", "confirm", "dismiss", "distrust", "undo", "trust", "comment", "assign",
+/// "close", "class", "move" or "merge".
 constexpr const char* DecisionName(DecisionKind kind) {
   switch (kind) {
     case DecisionKind::kConfirmHazard:
@@ -38,6 +55,18 @@ constexpr const char* DecisionName(DecisionKind kind) {
       return "undo";
     case DecisionKind::kTrustVehicle:
       return "trust";
+    case DecisionKind::kComment:
+      return "comment";
+    case DecisionKind::kAssign:
+      return "assign";
+    case DecisionKind::kCloseHazard:
+      return "close";
+    case DecisionKind::kReclassHazard:
+      return "class";
+    case DecisionKind::kMoveHazard:
+      return "move";
+    case DecisionKind::kMergeHazard:
+      return "merge";
   }
   return "unknown";
 }
@@ -61,12 +90,13 @@ struct DecisionRecord {
   DecisionKind kind = DecisionKind::kConfirmHazard;
   std::string subject;          ///< UUID of the hazard or the map change, or the vehicle's name.
   std::string official;         ///< Printable UTF-8 of at most 64 bytes.
-  std::string reason;           ///< Of at most 200 bytes; may be empty.
+  std::string reason;           ///< Of at most kMaxDecisionTextBytes; may be empty.
+  std::string detail;           ///< What was changed into what, in words; may be empty.
   std::int64_t at_ns = 0;       ///< Zone clock.
   std::uint64_t hazards = 0;    ///< Of a vehicle's: how many it changed.
   std::uint64_t undone_by = 0;  ///< Id of the decision that took it back; 0: it stands.
   /// What was before, as one line of plain numbers: PackPresence of a hazard's life, PackBefore of
-  /// a map change, PackTrust of a vehicle.
+  /// a map change, PackTrust of a vehicle; of a desk's decision see HazardDesk.
   std::string before;
   /// What it did to vehicles and to the class: PackEffects; empty when nothing.
   std::string effects;

@@ -199,6 +199,20 @@ void HazardRegistry::SetLife(Slot slot, const PresenceRecord& life, double prese
   NoteChange(slot);
 }
 
+void HazardRegistry::Edit(Slot slot, const std::string& class_name, const HazardEstimate& estimate,
+                          std::uint64_t sequence, std::int64_t now_ns) {
+  RememberForUndo(slot);
+  TakeFromGrid(slot);
+  HazardRecord& record = records_[slot];
+  record.hazard_class = ClassOf(class_name);
+  record.estimate = estimate;
+  record.updated_ns = now_ns;
+  PutOnGrid(slot);
+  if (record.sequence == sequence) return;
+  record.sequence = sequence;
+  NoteChange(slot);
+}
+
 void HazardRegistry::SetCourse(Slot slot, double course_rad) {
   RememberForUndo(slot);
   records_[slot].course_rad = static_cast<float>(course_rad);

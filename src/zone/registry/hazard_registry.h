@@ -86,6 +86,9 @@ class HazardRegistry {
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
+  /// An official has said of which class the hazard is and where it lies.
+  void Edit(Slot slot, const std::string& class_name, const HazardEstimate& estimate,
+            std::uint64_t sequence, std::int64_t now_ns);
   /// In which direction the place is passed (Hazard::course_rad).
   void SetCourse(Slot slot, double course_rad);
   /// A newer picture.

@@ -36,17 +36,35 @@ std::optional<HazardSteps::Slot> HazardSteps::FindMatch(const protocol::Report& 
   const HazardRegistry& hazards = state_.hazards;
   const std::string class_name = hazards.HeadingOf(report.class_name);
   const streets::StreetMap* const map = config_.streets.get();
-  if (map == nullptr) return hazards.FindMatch(class_name, report.position);
-  const auto on =
-      streets::FindCarriageway(*map, SpotOf(report.position, report.covariance_m2, course_rad));
-  if (!on) return hazards.FindMatch(class_name, report.position);
-  return hazards.FindMatch(class_name, report.position, [&](Slot slot) {
+  const auto on = map == nullptr
+                      ? std::nullopt
+                      : streets::FindCarriageway(
+                            *map, SpotOf(report.position, report.covariance_m2, course_rad));
+  const auto may_match = [&](Slot slot) {
+    if (!on) return true;
     const HazardRecord& record = hazards.Record(slot);
     const auto known = streets::FindCarriageway(
         *map, SpotOf(record.estimate.position, record.estimate.covariance_m2,
                      static_cast<double>(record.course_rad)));
     return !known || !streets::LieOnOppositeCarriageways(*map, *on, *known);
-  });
+  };
+  const auto match = on ? hazards.FindMatch(class_name, report.position, may_match)
+                        : hazards.FindMatch(class_name, report.position);
+  return match ? match : FindRedirected(class_name, report.position, may_match);
+}
+
+/// The hazard that an official has edited, and that the report would match as it was before.
+std::optional<HazardSteps::Slot> HazardSteps::FindRedirected(
+    const std::string& class_name, const geo::GeoPoint& position,
+    const std::function<bool(Slot)>& may_match) const {
+  if (state_.redirects.size() == 0) return std::nullopt;
+  const auto hazard = state_.redirects.Find(
+      class_name, position, config_.catalogue.DuplicateRadiusM(class_name), [&](const Uuid& uuid) {
+        const auto slot = state_.hazards.Find(uuid);
+        return slot && state_.hazards.State(*slot) != HazardState::kGone;
+      });
+  const auto slot = hazard ? state_.hazards.Find(*hazard) : std::nullopt;
+  return slot && may_match(*slot) ? slot : std::nullopt;
 }
 
 bool HazardSteps::PassTime(Slot slot, ZoneTransaction& transaction) {

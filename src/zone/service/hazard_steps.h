@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -53,6 +54,8 @@ class HazardSteps {
 
  private:
   std::optional<Slot> FindMatch(const protocol::Report& report, double course_rad) const;
+  std::optional<Slot> FindRedirected(const std::string& class_name, const geo::GeoPoint& position,
+                                     const std::function<bool(Slot)>& may_match) const;
 
   const ZoneConfig& config_;
   ZoneState& state_;

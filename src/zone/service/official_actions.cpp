@@ -145,7 +145,9 @@ std::optional<OfficialActions::HazardDecision> OfficialActions::Decide(
       return decision;
     }
   }
-  const LifecycleRule rule = confirms ? &HazardLifecycle::Confirm : &HazardLifecycle::Reject;
+  const LifecycleRule rule = confirms                             ? &HazardLifecycle::Confirm
+                             : kind == DecisionKind::kCloseHazard ? &HazardLifecycle::Close
+                                                                  : &HazardLifecycle::Reject;
   decision.step = (steps_.lifecycle().*rule)(entry, official, why, now_ns, decision.life);
   if (!decision.step.transition) return std::nullopt;
   if (seen) RequireAsSeen(*slot, *seen);
@@ -164,6 +166,12 @@ std::optional<OfficialActions::HazardDecision> OfficialActions::Reject(
     const Uuid& hazard, const std::string& official, const std::string& why,
     const std::optional<SeenHazard>& seen, std::int64_t now_ns) const {
   return Decide(hazard, official, why, seen, now_ns, DecisionKind::kRejectHazard);
+}
+
+std::optional<OfficialActions::HazardDecision> OfficialActions::Close(
+    const Uuid& hazard, const std::string& official, const std::string& why,
+    const std::optional<SeenHazard>& seen, std::int64_t now_ns) const {
+  return Decide(hazard, official, why, seen, now_ns, DecisionKind::kCloseHazard);
 }
 
 std::optional<OfficialActions::HazardDecision> OfficialActions::Undo(

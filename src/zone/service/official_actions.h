@@ -64,6 +64,10 @@ class OfficialActions {
                                        const std::string& why,
                                        const std::optional<SeenHazard>& seen,
                                        std::int64_t now_ns) const;
+  /// The same of one that was there and is repaired (HazardLifecycle::Close).
+  std::optional<HazardDecision> Close(const Uuid& hazard, const std::string& official,
+                                      const std::string& why, const std::optional<SeenHazard>& seen,
+                                      std::int64_t now_ns) const;
   /// What it means to take the newest of these decisions back, if it is the one that is meant
   /// (`meant`: its id; none for whichever it is); none unless `undone` is kDone.
   std::optional<HazardDecision> Undo(const Uuid& hazard, const std::string& official,

@@ -251,6 +251,8 @@ SightingSays ReportIntake::WhatItSays(Slot slot, const protocol::Report& report,
     return one.vehicle != 0 && !is_of_vehicle(one);
   };
   const auto& voices = earlier.voices;
+  // Where an official has put it, it lies.
+  if (state_.redirects.IsPlaced(state_.hazards.Record(slot).uuid)) return SightingSays::kWhen;
   if (std::none_of(voices.begin(), voices.end(), is_of_vehicle)) return SightingSays::kWhere;
   const bool is_alone = std::none_of(voices.begin(), voices.end(), is_of_another);
   return is_alone && !earlier.official && state_.hazards.IsSurer(slot, report)

@@ -43,6 +43,7 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
       map_changes_(config_, state_, places_),
       polls_(config_, state_, steps_, images_, pictures_, allowance_, vehicles_, places_),
       officials_(config_, state_, steps_),
+      desk_(config_, state_, steps_),
       ageing_(state_, steps_) {
   state_.damage += places_.Load();
   sequence_ = state_.sequence;
@@ -256,6 +257,55 @@ bool ZoneService::Verify(const Uuid& hazard, const std::string& why) {
       .has_value();
 }
 
+std::optional<std::uint64_t> ZoneService::Close(const Uuid& hazard, const std::string& official,
+                                                const std::string& reason,
+                                                const std::optional<SeenHazard>& seen) {
+  const std::string why = officials_.CheckedReason(official, reason);
+  return DecideHazard(
+      [&](std::int64_t now_ns) { return officials_.Close(hazard, official, why, seen, now_ns); });
+}
+
+template <typename Change>
+std::uint64_t ZoneService::ChangeAtDesk(const Change& change) {
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
+  HazardDesk::Done done;
+  {
+    const WriterLock lock(data_mutex_);
+    Commit(transaction, [&] { done = change(transaction); });
+    desk_.Keep(done);
+  }
+  FollowUp(transaction);
+  return done.decision;
+}
+
+std::optional<std::uint64_t> ZoneService::Act(const Uuid& hazard, const std::string& official,
+                                              const DeskAction& action) {
+  officials_.CheckedReason(official, "");
+  const MutexLock writer(writer_mutex_);
+  if (!desk_.Check(hazard, action)) return std::nullopt;
+  return ChangeAtDesk([&](ZoneTransaction& transaction) {
+    writer_mutex_.AssertHeld();
+    return desk_.Apply(hazard, official, action, transaction);
+  });
+}
+
+/// None where the undo means no decision of the desk.
+std::optional<ZoneService::Undone> ZoneService::UndoAtDesk(const Uuid& hazard,
+                                                           const std::string& official,
+                                                           const std::string& why,
+                                                           std::optional<std::uint64_t> meant) {
+  const MutexLock writer(writer_mutex_);
+  const auto decision = desk_.MeantBy(hazard, meant);
+  if (!decision) return std::nullopt;
+  if (decision->undone_by != 0) return Undone::kBefore;
+  if (const auto why_not = desk_.WhyNotUndoable(*decision)) throw DecisionConflict(*why_not);
+  ChangeAtDesk([&](ZoneTransaction& transaction) {
+    writer_mutex_.AssertHeld();
+    return desk_.Undo(*decision, official, why, transaction);
+  });
+  return Undone::kDone;
+}
+
 bool ZoneService::Remove(const Uuid& hazard, const std::string& reason) {
   return DecideHazard(
              [&](std::int64_t now_ns) { return officials_.Remove(hazard, reason, now_ns); })
@@ -296,6 +346,7 @@ ZoneService::Undone ZoneService::Undo(const Uuid& hazard, const std::string& off
                                       const std::string& reason,
                                       std::optional<std::uint64_t> meant) {
   const std::string why = officials_.CheckedReason(official, reason);
+  if (const auto at_desk = UndoAtDesk(hazard, official, why, meant)) return *at_desk;
   Undone undone = Undone::kUnknown;
   DecideHazard([&](std::int64_t now_ns) {
     return officials_.Undo(hazard, official, why, meant, now_ns, undone);
@@ -523,6 +574,54 @@ std::vector<StoredEvent> ZoneService::TurnsAfter(std::uint64_t sequence, std::si
 const ZoneStore& ZoneService::HistoryStore() const {
   const ReaderLock lock(data_mutex_);
   return StateForReaders().store;
+}
+
+std::vector<DecisionRecord> ZoneService::DecisionsAbout(const Uuid& hazard,
+                                                        std::size_t limit) const {
+  return HistoryStore().LoadDecisionsAbout(hazard.ToString(), limit);
+}
+
+std::vector<Assignment> ZoneService::Assignments() const {
+  std::vector<Assignment> assignments = HistoryStore().LoadAssignments();
+  const ReaderLock lock(data_mutex_);
+  const HazardRegistry& hazards = StateForReaders().hazards;
+  const auto is_off_map = [&](const Assignment& assignment) {
+    const auto slot = hazards.Find(assignment.hazard);
+    return !slot || !IsOnMap(hazards.State(*slot));
+  };
+  assignments.erase(std::remove_if(assignments.begin(), assignments.end(), is_off_map),
+                    assignments.end());
+  return assignments;
+}
+
+std::vector<SightingRecord> ZoneService::Sightings(const Uuid& hazard, std::size_t limit) const {
+  std::vector<Uuid> hazards{hazard};
+  for (const DecisionRecord& decision : DecisionsAbout(hazard, limit)) {
+    if (decision.kind != DecisionKind::kMergeHazard || decision.undone_by != 0) continue;
+    const auto merged = Uuid::Parse(decision.before.substr(0, decision.before.find('|')));
+    if (merged) hazards.push_back(*merged);
+  }
+  std::vector<SightingRecord> sightings;
+  for (const Uuid& each : hazards) {
+    const ZoneStore* store = nullptr;
+    std::uint64_t id = 0;
+    std::size_t most = 0;
+    {
+      const ReaderLock lock(data_mutex_);
+      const ZoneState& state = StateForReaders();
+      const auto slot = state.hazards.Find(each);
+      if (!slot) continue;
+      store = &state.store;
+      id = state.hazards.Record(*slot).id;
+      most = std::min<std::size_t>(limit, state.hazards.Record(*slot).estimate.sightings);
+    }
+    const std::vector<SightingRecord> more = store->LoadSightings(id, each, most);
+    sightings.insert(sightings.end(), more.begin(), more.end());
+  }
+  std::stable_sort(sightings.begin(), sightings.end(),
+                   [](const auto& a, const auto& b) { return a.stamp_ns > b.stamp_ns; });
+  if (sightings.size() > limit) sightings.resize(limit);
+  return sightings;
 }
 
 std::vector<MapChangeFeature> ZoneService::QueryMapChanges(const std::optional<geo::GeoBox>& box,

@@ -18,6 +18,7 @@
 #include "protocol/report.h"
 #include "streets/street_place.h"
 #include "zone/admission/vehicle_allowance.h"
+#include "zone/desk/desk_action.h"
 #include "zone/model/decision.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
@@ -26,10 +27,12 @@
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/owned_directory.h"
 #include "zone/pictures/picture_allowance.h"
+#include "zone/places/place_book.h"
 #include "zone/registry/shared_view.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/ageing.h"
 #include "zone/service/event_stream.h"
+#include "zone/service/hazard_desk.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/map_change_intake.h"
 #include "zone/service/official_actions.h"
@@ -40,7 +43,6 @@
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
 #include "zone/service/zone_transaction.h"
-#include "zone/store/place_book.h"
 
 namespace livemap::zone {
 
@@ -148,6 +150,25 @@ class ZoneService {
   std::optional<std::uint64_t> Confirm(const Uuid& hazard, const std::string& official,
                                        const std::string& reason = "",
                                        const std::optional<SeenHazard>& seen = std::nullopt);
+  /// As Reject: the hazard was there and is repaired.
+  std::optional<std::uint64_t> Close(const Uuid& hazard, const std::string& official,
+                                     const std::string& reason = "",
+                                     const std::optional<SeenHazard>& seen = std::nullopt);
+  /// An official comments, assigns, edits or merges a hazard (HazardDesk): committed, with an event
+  /// where the hazard itself changes. Returns the decision's id; none for an unknown hazard. Throws
+  /// Error for what is not acceptable, DecisionConflict for what does not fit what is there, and
+  /// StoreError.
+  std::optional<std::uint64_t> Act(const Uuid& hazard, const std::string& official,
+                                   const DeskAction& action);
+  /// The newest `limit` decisions about one hazard, the newest first. Throws StoreError. As Events.
+  std::vector<DecisionRecord> DecisionsAbout(const Uuid& hazard, std::size_t limit) const;
+  /// Who mends which hazard that is on the map, the first due first. Throws StoreError. As Events.
+  std::vector<Assignment> Assignments() const;
+  /// The newest `limit` reports of the hazard and of those that were merged into it, the newest
+  /// first; empty for an unknown one. Throws StoreError. As Events.
+  std::vector<SightingRecord> Sightings(const Uuid& hazard, std::size_t limit) const;
+  /// The zone's clock.
+  std::int64_t NowNs() const { return now_ns_(); }
   /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
   /// suspicion does, and all that it said is taken back from the hazards that are not gone
   /// (HazardLifecycle::Withdraw), each with an event whose reason names vehicle and official as far
@@ -159,7 +180,8 @@ class ZoneService {
                                       const std::string& reason);
   /// What came of an undo.
   using Undone = OfficialActions::Undone;
-  /// Takes the newest confirmation or rejection of the hazard back: state, odds, voices and the
+  /// Takes the newest confirmation, rejection or repair of the hazard back, or the desk's decision
+  /// that is meant or is newer (HazardDesk::MeantBy). Of the former: state, odds, voices and the
   /// official's mark are as before, what vehicles have said since counts on top, and what the
   /// decision held against vehicles or taught of the class is taken back. Committed with an event.
   /// With `meant`, the id of a decision, nothing is taken back unless that is the newest one.
@@ -260,6 +282,10 @@ class ZoneService {
   void LetHazardsAge() REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
   template <typename Decide>
   std::optional<std::uint64_t> DecideHazard(const Decide& decide);
+  template <typename Change>
+  std::uint64_t ChangeAtDesk(const Change& change) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  std::optional<Undone> UndoAtDesk(const Uuid& hazard, const std::string& official,
+                                   const std::string& why, std::optional<std::uint64_t> meant);
   std::optional<std::uint64_t> DecideMapChange(const Uuid& uuid, MapChangeState to,
                                                const std::string& official,
                                                const std::string& reason);
@@ -315,6 +341,7 @@ class ZoneService {
   MapChangeIntake map_changes_ GUARDED_BY(writer_mutex_);
   PollCoordinator polls_;      ///< SetVehicle: any thread.
   OfficialActions officials_;  ///< CheckedReason: any thread.
+  HazardDesk desk_ GUARDED_BY(writer_mutex_);
   Ageing ageing_ GUARDED_BY(writer_mutex_);
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <unordered_map>
+#include <utility>
 
 #include "common/error.h"
 
@@ -54,6 +55,7 @@ void ZoneState::Load() {
     sequence = std::max(sequence, row.feature.sequence);
   });
   map_changes.SkipIdsTo(static_cast<std::uint32_t>(store.LastMapChangeId()));
+  damage += store.LoadRedirects([this](Redirect redirect) { redirects.Add(std::move(redirect)); });
   damage += store.CheckWithdrawals();
 }
 

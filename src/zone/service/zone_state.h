@@ -7,6 +7,7 @@
 #include "common/uuid.h"
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
+#include "zone/desk/redirects.h"
 #include "zone/model/store_damage.h"
 #include "zone/registry/hazard_registry.h"
 #include "zone/registry/map_change_registry.h"
@@ -37,7 +38,8 @@ struct ZoneState {
   std::mt19937_64 generator;    ///< Makes uuids and the seeds of hashes.
   HazardRegistry hazards;
   MapChangeRegistry map_changes;
-  StoreDamage damage;  ///< Rows that were found invalid while loading.
+  Redirects redirects;  ///< The writer's, as `store`: changed after their commit.
+  StoreDamage damage;   ///< Rows that were found invalid while loading.
 
  private:
   void Load();

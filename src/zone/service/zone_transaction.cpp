@@ -146,6 +146,9 @@ void ZoneTransaction::Write() {
     if (reported != reported_classes_.end()) row.hazard.class_name = reported->second;
     store.WriteHazard(row);
   }
+  for (const Slot slot : renamed_) {
+    store.WriteClass(state_.hazards.Record(slot).id, state_.hazards.ClassName(slot));
+  }
   for (const auto& [slot, course_rad] : courses_) {
     store.WriteCourse(state_.hazards.Record(slot).id, course_rad);
   }

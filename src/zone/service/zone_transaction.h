@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -82,6 +83,8 @@ class ZoneTransaction {
   /// A new hazard was reported under this name, whatever the catalogue calls it now: the store
   /// keeps the name, so that one start with a wrong catalogue loses none.
   void NameHazard(Slot slot, const std::string& reported_class);
+  /// The hazard's class is another one now: in the store too, which else keeps the first name.
+  void RenameHazard(Slot slot) { renamed_.insert(slot); }
   /// The hazard is passed in this direction: in memory and in the store.
   void KeepCourse(Slot slot, double course_rad);
   /// The event, whose sequence was `sequence() + 1`.
@@ -126,8 +129,9 @@ class ZoneTransaction {
   std::vector<HazardEvent> hazard_events_;
   std::vector<EventPlace> places_;  ///< Of each hazard event.
   std::vector<PictureChange> pictures_;
-  std::vector<Slot> touched_;                              ///< Repeats until it is written.
-  std::map<Slot, std::string> reported_classes_;           ///< Of new hazards.
+  std::vector<Slot> touched_;                     ///< Repeats until it is written.
+  std::map<Slot, std::string> reported_classes_;  ///< Of new hazards.
+  std::set<Slot> renamed_;
   std::map<Slot, double> courses_;                         ///< Of hazards that had none.
   std::map<std::string, LearnedLifetime> learned_before_;  ///< By class.
   std::map<std::uint64_t, TrustRecord> trust_before_;      ///< By vehicle.

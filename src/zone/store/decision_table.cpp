@@ -14,13 +14,19 @@ namespace {
 constexpr char kSoundDecision[] =
     "typeof(kind) = 'integer' AND typeof(official) = 'text' AND "
     "length(CAST(official AS BLOB)) <= 64 AND typeof(reason) = 'text' AND "
-    "length(CAST(reason AS BLOB)) <= 200 AND typeof(at_ns) = 'integer' AND "
+    "length(CAST(reason AS BLOB)) <= 500 AND typeof(at_ns) = 'integer' AND "
     "typeof(hazards) = 'integer' AND typeof(undone_by) = 'integer' AND typeof(before) = 'text' AND "
     "length(CAST(before AS BLOB)) <= 5000 AND typeof(effects) = 'text' AND "
     "length(CAST(effects AS BLOB)) <= 500";
+constexpr char kDetail[] =
+    "coalesce((SELECT substr(detail, 1, 200) FROM decision_details WHERE decision_id = "
+    "decisions.id AND typeof(detail) = 'text'), '')";
 constexpr char kDecisionColumns[] =
-    "SELECT id, kind, official, reason, at_ns, hazards, undone_by, before, effects FROM decisions "
-    "WHERE subject = :s AND ";
+    "SELECT id, kind, official, reason, at_ns, hazards, undone_by, before, effects, ";
+constexpr char kOfSubject[] = " FROM decisions WHERE subject = :s AND ";
+/// Those that say whether a hazard is there (or what becomes of a map change or a vehicle): no undo
+/// and none of IsOfDesk.
+constexpr char kJudges[] = " AND kind NOT IN (5, 7, 8, 10, 11, 12)";
 /// As this program writes a uuid: one that no row may have could never be dropped by it.
 constexpr char kSoundWithdrawal[] =
     "typeof(hazard_uuid) = 'text' AND length(CAST(hazard_uuid AS BLOB)) = 36 AND "
@@ -33,7 +39,7 @@ template <typename Row>
 bool IsSound(const Row& row) {
   return row.id >= 1 && row.id < kMaxSequence && IsIndex(row.kind, kDecisionKinds) &&
          protocol::IsPrintableText(row.official, kMaxStoredTextBytes) &&
-         (row.reason.empty() || protocol::IsPrintableText(row.reason, kMaxEventReasonBytes)) &&
+         (row.reason.empty() || protocol::IsPrintableText(row.reason, kMaxDecisionTextBytes)) &&
          IsStamp(row.at_ns) && row.hazards >= 0 && row.undone_by >= 0 &&
          row.undone_by < kMaxSequence;
 }
@@ -42,25 +48,26 @@ bool IsSound(const Row& row) {
 
 DecisionTable::DecisionTable(soci::session& session)
     : session_(session),
-      find_((session.prepare << kDecisionColumns << kSoundDecision << " ORDER BY id DESC LIMIT :l",
+      find_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
+                             << " ORDER BY id DESC LIMIT :l",
              soci::use(row_.subject), soci::use(row_.limit), soci::into(row_.id),
              soci::into(row_.kind), soci::into(row_.official), soci::into(row_.reason),
              soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
-             soci::into(row_.before), soci::into(row_.effects))),
-      find_newest_((session.prepare << kDecisionColumns << kSoundDecision
-                                    << " AND kind <> :k AND id < :b ORDER BY id DESC LIMIT 1",
-                    soci::use(row_.subject), soci::use(row_.wanted_kind), soci::use(row_.below),
-                    soci::into(row_.id), soci::into(row_.kind), soci::into(row_.official),
-                    soci::into(row_.reason), soci::into(row_.at_ns), soci::into(row_.hazards),
-                    soci::into(row_.undone_by), soci::into(row_.before), soci::into(row_.effects))),
-      find_distrust_((session.prepare << kDecisionColumns << kSoundDecision
+             soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail))),
+      find_newest_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
+                                    << kJudges << " AND id < :b ORDER BY id DESC LIMIT 1",
+                    soci::use(row_.subject), soci::use(row_.below), soci::into(row_.id),
+                    soci::into(row_.kind), soci::into(row_.official), soci::into(row_.reason),
+                    soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
+                    soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail))),
+      find_distrust_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
                                       << " AND kind = :k AND undone_by = 0 AND id < :b "
                                          "ORDER BY id DESC LIMIT 1",
                       soci::use(row_.subject), soci::use(row_.wanted_kind), soci::use(row_.below),
                       soci::into(row_.id), soci::into(row_.kind), soci::into(row_.official),
                       soci::into(row_.reason), soci::into(row_.at_ns), soci::into(row_.hazards),
-                      soci::into(row_.undone_by), soci::into(row_.before),
-                      soci::into(row_.effects))),
+                      soci::into(row_.undone_by), soci::into(row_.before), soci::into(row_.effects),
+                      soci::into(row_.detail))),
       write_((session.prepare
                   << "INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
                      "undone_by, before, effects) VALUES (:k, :s, :o, :r, :a, :h, :u, :b, :e)",
@@ -97,6 +104,7 @@ DecisionRecord DecisionTable::ToDecision() const {
   decision.undone_by = static_cast<std::uint64_t>(row_.undone_by);
   decision.before = row_.before;
   decision.effects = row_.effects;
+  decision.detail = row_.detail;
   return decision;
 }
 
@@ -132,13 +140,15 @@ std::vector<DecisionRecord> DecisionTable::LoadRange(const char* which, std::uin
     row_.below = static_cast<long long>(std::min<std::uint64_t>(id, kMaxSequence));
     soci::statement find =
         (session_.prepare << "SELECT id, kind, subject, official, reason, at_ns, hazards, "
-                             "undone_by, before, effects FROM decisions WHERE typeof(subject) = "
-                             "'text' AND length(CAST(subject AS BLOB)) <= 64 AND "
+                             "undone_by, before, effects, "
+                          << kDetail
+                          << " FROM decisions WHERE typeof(subject) = 'text' AND "
+                             "length(CAST(subject AS BLOB)) <= 64 AND "
                           << kSoundDecision << " AND " << which,
          soci::use(row_.below), soci::into(row_.id), soci::into(row_.kind),
          soci::into(row_.subject), soci::into(row_.official), soci::into(row_.reason),
          soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
-         soci::into(row_.before), soci::into(row_.effects));
+         soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail));
     find.execute();
     while (decisions.size() < limit && find.fetch()) {
       if (IsSound(row_) && protocol::IsPrintableText(row_.subject, kMaxStoredTextBytes)) {
@@ -165,7 +175,6 @@ std::optional<DecisionRecord> DecisionTable::FindBelow(soci::statement& find,
 }
 
 std::optional<DecisionRecord> DecisionTable::FindNewestDecision(const std::string& subject) {
-  row_.wanted_kind = static_cast<int>(DecisionKind::kUndo);
   return FindBelow(find_newest_, subject, UINT64_MAX);
 }
 
@@ -189,6 +198,10 @@ std::uint64_t DecisionTable::WriteDecision(const DecisionRecord& decision) {
     write_.execute(true);
     long long id = 0;
     session_ << "SELECT max(id) FROM decisions", soci::into(id);
+    if (!decision.detail.empty()) {
+      session_ << "INSERT INTO decision_details (decision_id, detail) VALUES (:i, :d)",
+          soci::use(id), soci::use(decision.detail);
+    }
     return static_cast<std::uint64_t>(std::max(id, 0LL));
   });
 }

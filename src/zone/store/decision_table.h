@@ -38,7 +38,7 @@ class DecisionTable {
  private:
   /// SOCI binds to places, not to values.
   struct Row {
-    std::string subject, hazard_uuid, official, reason, before, effects;
+    std::string subject, hazard_uuid, official, reason, before, effects, detail;
     long long id = 0, at_ns = 0, hazards = 0, undone_by = 0, limit = 0, below = 0;
     int kind = 0, wanted_kind = 0;
   };

@@ -218,6 +218,14 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
   });
 }
 
+void HazardTable::WriteClass(std::uint64_t hazard_id, const std::string& class_name) {
+  ExplainStore("writing a hazard's class", [&] {
+    const auto id = static_cast<long long>(hazard_id);
+    session_ << "UPDATE hazards SET class_name = :c WHERE id = :i", soci::use(class_name),
+        soci::use(id);
+  });
+}
+
 void HazardTable::WriteCourse(std::uint64_t hazard_id, double course_rad) {
   ExplainStore("writing the course of a hazard", [&] {
     row_.id = static_cast<long long>(hazard_id);

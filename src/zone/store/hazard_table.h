@@ -26,6 +26,7 @@ class HazardTable {
   StoreDamage LoadCourses(const std::function<void(std::uint64_t, double)>& take);
   std::uint64_t LastId();
   void Write(const ZoneStore::HazardRow& hazard);
+  void WriteClass(std::uint64_t hazard_id, const std::string& class_name);
   void WriteCourse(std::uint64_t hazard_id, double course_rad);
 
  private:

@@ -11,6 +11,7 @@
 
 #include "common/mutex.h"
 #include "zone/store/decision_table.h"
+#include "zone/store/desk_table.h"
 #include "zone/store/event_log.h"
 #include "zone/store/map_change_table.h"
 
@@ -26,7 +27,8 @@ class StoredHistories {
       : session_(soci::sqlite3, connection),
         events_(OnlyReading(session_)),
         map_changes_(session_),
-        decisions_(session_) {}
+        decisions_(session_),
+        desk_(session_) {}
 
   /// EventLog::Load. Throws as that does.
   std::vector<StoredEvent> OfHazard(const Uuid& hazard, std::uint64_t sequence, std::size_t limit) {
@@ -42,6 +44,22 @@ class StoredHistories {
   std::vector<DecisionRecord> OfOfficials(std::uint64_t before, std::size_t limit) {
     const MutexLock lock(mutex_);
     return decisions_.LoadAllDecisions(before, limit);
+  }
+  /// DecisionTable::LoadDecisions. Throws as that does.
+  std::vector<DecisionRecord> OfSubject(const std::string& subject, std::size_t limit) {
+    const MutexLock lock(mutex_);
+    return decisions_.LoadDecisions(subject, limit);
+  }
+  /// DeskTable::LoadAssignments. Throws as that does.
+  std::vector<Assignment> Assignments() {
+    const MutexLock lock(mutex_);
+    return desk_.LoadAssignments();
+  }
+  /// DeskTable::LoadSightings. Throws as that does.
+  std::vector<SightingRecord> Sightings(std::uint64_t hazard_id, const Uuid& hazard,
+                                        std::size_t limit) {
+    const MutexLock lock(mutex_);
+    return desk_.LoadSightings(hazard_id, hazard, limit);
   }
 
   /// EventLog::LoadTurnsAfter. Throws as that does.
@@ -66,6 +84,7 @@ class StoredHistories {
   EventLog events_ GUARDED_BY(mutex_);
   MapChangeTable map_changes_ GUARDED_BY(mutex_);
   DecisionTable decisions_ GUARDED_BY(mutex_);
+  DeskTable desk_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone

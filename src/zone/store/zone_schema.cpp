@@ -292,6 +292,31 @@ const Statements& ZoneSchemaToVersion7() {
   return kStatements;
 }
 
+/// What officials do beside confirming and rejecting: who mends a hazard until when, what their
+/// decisions changed in words, and where reports of hazards go that were edited (Redirect).
+const Statements& ZoneSchemaToVersion8() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS decision_details (
+           decision_id INTEGER PRIMARY KEY,
+           detail TEXT NOT NULL))",
+      R"(CREATE TABLE IF NOT EXISTS assignments (
+           hazard_uuid VARCHAR(36) PRIMARY KEY,
+           team TEXT NOT NULL,
+           due_ns BIGINT NOT NULL,
+           since_ns BIGINT NOT NULL,
+           decision_id BIGINT NOT NULL))",
+      R"(CREATE TABLE IF NOT EXISTS redirects (
+           decision_id INTEGER PRIMARY KEY,
+           kind INTEGER NOT NULL,
+           class_name TEXT NOT NULL,
+           latitude DOUBLE PRECISION NOT NULL,
+           longitude DOUBLE PRECISION NOT NULL,
+           from_uuid VARCHAR(36) NOT NULL,
+           hazard_uuid VARCHAR(36) NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (8)"};
+  return kStatements;
+}
+
 int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -315,7 +340,7 @@ void MigrateZoneStore(soci::session& session, const std::string& path) {
   const std::array<const Statements*, kZoneSchemaVersion> steps{
       &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
       &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6(),
-      &ZoneSchemaToVersion7()};
+      &ZoneSchemaToVersion7(), &ZoneSchemaToVersion8()};
   for (int step = version; step < kZoneSchemaVersion; ++step) {
     soci::transaction transaction(session);
     for (const char* statement : *steps[static_cast<std::size_t>(step)]) session << statement;

@@ -7,7 +7,7 @@
 namespace livemap::zone {
 
 /// The schema that this program writes.
-constexpr int kZoneSchemaVersion = 7;
+constexpr int kZoneSchemaVersion = 8;
 
 /// Brings the database at `path`, which `session` has open, up to date, step by step, each step in
 /// its own transaction. Throws StoreError when it is of a newer schema.

@@ -7,6 +7,7 @@
 
 #include "common/sqlite.h"
 #include "zone/store/decision_table.h"
+#include "zone/store/desk_table.h"
 #include "zone/store/event_log.h"
 #include "zone/store/hazard_table.h"
 #include "zone/store/learned_tables.h"
@@ -64,6 +65,7 @@ class ZoneStore::Implementation {
         map_changes_(session_),
         places_(session_),
         decisions_(session_),
+        desk_(session_),
         histories_(ZoneStoreConnection(path)) {}
 
   soci::session session_;
@@ -74,6 +76,7 @@ class ZoneStore::Implementation {
   MapChangeTable map_changes_;
   PlaceTable places_;
   DecisionTable decisions_;
+  DeskTable desk_;
   StoredHistories histories_;
 };
 
@@ -162,6 +165,28 @@ std::vector<StoredEvent> ZoneStore::LoadTurnsAfter(std::uint64_t sequence,
   return implementation_->histories_.TurnsAfter(sequence, limit);
 }
 
+std::vector<DecisionRecord> ZoneStore::LoadDecisionsAbout(const std::string& subject,
+                                                          std::size_t limit) const {
+  return implementation_->histories_.OfSubject(subject, limit);
+}
+
+std::vector<Assignment> ZoneStore::LoadAssignments() const {
+  return implementation_->histories_.Assignments();
+}
+
+std::vector<Assignment> ZoneStore::LoadAssignmentsForWriter() {
+  return implementation_->desk_.LoadAssignments();
+}
+
+std::vector<SightingRecord> ZoneStore::LoadSightings(std::uint64_t hazard_id, const Uuid& hazard,
+                                                     std::size_t limit) const {
+  return implementation_->histories_.Sightings(hazard_id, hazard, limit);
+}
+
+StoreDamage ZoneStore::LoadRedirects(const std::function<void(Redirect)>& take) {
+  return implementation_->desk_.LoadRedirects(take);
+}
+
 StoreDamage ZoneStore::LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take) {
   return implementation_->places_.Load(take);
 }
@@ -206,6 +231,10 @@ void ZoneStore::Rollback() noexcept {
 }
 
 void ZoneStore::WriteHazard(const HazardRow& row) { implementation_->hazards_.Write(row); }
+
+void ZoneStore::WriteClass(std::uint64_t hazard_id, const std::string& class_name) {
+  implementation_->hazards_.WriteClass(hazard_id, class_name);
+}
 
 void ZoneStore::WriteCourse(std::uint64_t hazard_id, double course_rad) {
   implementation_->hazards_.WriteCourse(hazard_id, course_rad);
@@ -265,6 +294,22 @@ void ZoneStore::WriteWithdrawal(std::uint64_t decision, const Withdrawal& withdr
 
 void ZoneStore::DropWithdrawal(std::uint64_t decision, const Uuid& hazard) {
   implementation_->decisions_.DropWithdrawal(decision, hazard);
+}
+
+void ZoneStore::WriteRedirect(const Redirect& redirect) {
+  implementation_->desk_.WriteRedirect(redirect);
+}
+
+void ZoneStore::DropRedirect(std::uint64_t decision) {
+  implementation_->desk_.DropRedirect(decision);
+}
+
+void ZoneStore::WriteAssignment(const Assignment& assignment) {
+  implementation_->desk_.WriteAssignment(assignment);
+}
+
+void ZoneStore::DropAssignment(const Uuid& hazard) {
+  implementation_->desk_.DropAssignment(hazard);
 }
 
 void ZoneStore::WriteMapChange(const MapChangeRow& row) {

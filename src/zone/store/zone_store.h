@@ -13,6 +13,8 @@
 #include "zone/belief/hazard_lifecycle.h"
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
+#include "zone/desk/desk_action.h"
+#include "zone/desk/redirects.h"
 #include "zone/model/decision.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
@@ -108,6 +110,21 @@ class ZoneStore {
   /// were not, or by which it leaves the map, in the order of their sequence; broken rows are left
   /// out. Any thread may.
   std::vector<StoredEvent> LoadTurnsAfter(std::uint64_t sequence, std::size_t limit) const;
+  /// The newest `limit` decisions about one subject, as LoadDecisions. Any thread may.
+  std::vector<DecisionRecord> LoadDecisionsAbout(const std::string& subject,
+                                                 std::size_t limit) const;
+  /// Who mends which hazard, the first due first and those without a day last; broken rows are left
+  /// out. Any thread may.
+  std::vector<Assignment> LoadAssignments() const;
+  /// The same over the writer's connection: with what the running transaction wrote.
+  std::vector<Assignment> LoadAssignmentsForWriter();
+  /// Up to `limit` reports that became, or were merged into, the hazard of this row, the newest
+  /// first; broken rows are left out. Any thread may. It reads the reports since the oldest of
+  /// them.
+  std::vector<SightingRecord> LoadSightings(std::uint64_t hazard_id, const Uuid& hazard,
+                                            std::size_t limit) const;
+  /// Every redirect, in the order of their decisions; as LoadHazards.
+  StoreDamage LoadRedirects(const std::function<void(Redirect)>& take);
   /// The newest `limit` decisions about a hazard, a map change or a vehicle
   /// (DecisionRecord::subject), the newest first; broken rows are left out.
   std::vector<DecisionRecord> LoadDecisions(const std::string& subject, std::size_t limit);
@@ -131,6 +148,8 @@ class ZoneStore {
 
   /// Adds the hazard, or replaces the row of the same id, which keeps its class's name.
   void WriteHazard(const HazardRow& row);
+  /// The hazard's row, which is there, has this class from now on.
+  void WriteClass(std::uint64_t hazard_id, const std::string& class_name);
   /// Adds the course, or replaces that of the same hazard.
   void WriteCourse(std::uint64_t hazard_id, double course_rad);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
@@ -159,6 +178,11 @@ class ZoneStore {
   /// Keeps what a distrust withdrew, unless that hazard has a row of this decision already.
   void WriteWithdrawal(std::uint64_t decision, const Withdrawal& withdrawal);
   void DropWithdrawal(std::uint64_t decision, const Uuid& hazard);
+  void WriteRedirect(const Redirect& redirect);
+  void DropRedirect(std::uint64_t decision);
+  /// Adds the assignment, or replaces that of the same hazard.
+  void WriteAssignment(const Assignment& assignment);
+  void DropAssignment(const Uuid& hazard);
   void WriteMapChange(const MapChangeRow& row);
   /// Forgets a feature and its history; what vehicles told of it stays, so that they are answered.
   void DropMapChange(std::uint64_t id);
