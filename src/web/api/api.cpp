@@ -58,10 +58,11 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       officials_(access_, zone, catalogue),
       hazards_(zone, catalogue),
       map_changes_(zone),
+      desk_(zone, catalogue),
       streets_(zone.streets()),
       feeds_(options_, zone, catalogue),
       ogc_(options_, zone, catalogue),
-      desk_(orders),
+      order_desk_(orders),
       orders_(access_, orders),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
@@ -231,6 +232,8 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   const std::string& path = target.path;
   const Visibility sees = access_.VisibilityFor(question);
   const bool is_decision = ParseDecisionTarget(path).has_value();
+  // As those who decided.
+  if (DeskApi::Has(path)) return sees.vehicles ? desk_.Answer(target) : LogInFirst();
   if (!is_decision && StartsWith(path, kHazardAddress)) {
     return sees.told ? hazards_.Answer(target, sees.candidates) : LogInFirst();
   }
@@ -272,7 +275,7 @@ HttpResponse Api::Metrics() const {
   server.answers = answer_times_.counts();
   HttpResponse answer;
   answer.content_type = kMetricsType;
-  answer.content = ZoneMetricsText(zone_, server, desk_);
+  answer.content = ZoneMetricsText(zone_, server, order_desk_);
   answer.headers.emplace_back("Cache-Control", "no-store");
   return answer;
 }

@@ -11,6 +11,7 @@
 #include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/access/access.h"
+#include "web/api/desk_api.h"
 #include "web/api/feed_api.h"
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
@@ -91,10 +92,11 @@ class Api : public Site {
   OfficialApi officials_;
   const HazardApi hazards_;
   const MapChangeApi map_changes_;
+  const DeskApi desk_;
   const StreetApi streets_;
   const FeedApi feeds_;
   const OgcApi ogc_;
-  const orders::OrderDesk* const desk_;  ///< Null where the zone has no work orders.
+  const orders::OrderDesk* const order_desk_;  ///< Null where the zone has no work orders.
   OrderApi orders_;
   std::optional<TileFile> tiles_;
   DurationHistogram answer_times_;

@@ -1,6 +1,7 @@
 #include "web/api/official_api.h"
 
 #include "common/time.h"
+#include "web/api/desk_body.h"
 #include "web/http/request_body.h"
 #include "web/json/map_change_json.h"
 
@@ -66,6 +67,7 @@ HttpResponse OfficialApi::DecideNow(const std::string& official, const DecisionT
   if (target.decision == Decision::kMapChange) {
     return DecideMapChange(target, official, question.body);
   }
+  if (IsDeskDecision(target.decision)) return ActAtDesk(target, official, question.body);
   const DecisionBody body = ParseDecisionBody(target.decision, question.body);
   if (target.decision == Decision::kDistrust || target.decision == Decision::kTrust) {
     return DecideVehicle(target, official, body.reason);
@@ -82,12 +84,28 @@ HttpResponse OfficialApi::DecideHazard(const DecisionTarget& target, const std::
   if (!hazard) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
   const auto decided = target.decision == Decision::kReject
                            ? zone_.Reject(*uuid, official, body.reason, body.seen)
+                       : target.decision == Decision::kClose
+                           ? zone_.Close(*uuid, official, body.reason, body.seen)
                            : zone_.Confirm(*uuid, official, body.reason, body.seen);
   if (!decided) {
     return MakeErrorAnswer(409, hazard->state == zone::HazardState::kRejected
                                     ? "the hazard is rejected already"
                                     : kHazardIsGone);
   }
+  const zone::Hazard now = *zone_.Find(*uuid);
+  return DecidedAnswer(HazardFeature(now, catalogue_, zone_.WordsOf(now)), *decided);
+}
+
+HttpResponse OfficialApi::ActAtDesk(const DecisionTarget& target, const std::string& official,
+                                    const std::string& body) {
+  const zone::DeskAction action = ParseDeskAction(target.decision, body);
+  const auto uuid = Uuid::Parse(target.id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  if (target.decision == Decision::kClass && !catalogue_.Names(action.class_name)) {
+    throw BadRequest("the zone's catalogue has no such class, see /api/v1/classes");
+  }
+  const auto decided = zone_.Act(*uuid, official, action);
+  if (!decided) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
   const zone::Hazard now = *zone_.Find(*uuid);
   return DecidedAnswer(HazardFeature(now, catalogue_, zone_.WordsOf(now)), *decided);
 }
@@ -149,6 +167,12 @@ const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) con
   switch (decision.kind) {
     case zone::DecisionKind::kConfirmHazard:
     case zone::DecisionKind::kRejectHazard:
+    case zone::DecisionKind::kCloseHazard:
+    case zone::DecisionKind::kComment:
+    case zone::DecisionKind::kAssign:
+    case zone::DecisionKind::kReclassHazard:
+    case zone::DecisionKind::kMoveHazard:
+    case zone::DecisionKind::kMergeHazard:
       return "hazard";
     case zone::DecisionKind::kConfirmMapChange:
     case zone::DecisionKind::kDismissMapChange:
@@ -166,7 +190,8 @@ const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) con
 HttpResponse OfficialApi::Decisions(const DecisionsQuery& query) const {
   Json answer;
   answer["decisions"] = Json::array();
-  const auto decisions = zone_.Decisions(query.before, query.limit);
+  const auto decisions = query.hazard ? zone_.DecisionsAbout(*query.hazard, query.limit)
+                                      : zone_.Decisions(query.before, query.limit);
   for (const zone::DecisionRecord& decision : decisions) {
     const bool is_undone = decision.undone_by != 0;
     answer["decisions"].push_back({{"id", decision.id},
@@ -175,12 +200,13 @@ HttpResponse OfficialApi::Decisions(const DecisionsQuery& query) const {
                                    {"subject", decision.subject},
                                    {"official", decision.official},
                                    {"reason", decision.reason},
+                                   {"detail", decision.detail},
                                    {"hazards", decision.hazards},
                                    {"time", Rfc3339(decision.at_ns)},
                                    {"undone_by", is_undone ? Json(decision.undone_by) : Json()}});
   }
   // As many as were asked for: there may be more.
-  const bool is_cut = decisions.size() == query.limit;
+  const bool is_cut = !query.hazard && decisions.size() == query.limit;
   answer["next"] = is_cut ? Json(decisions.back().id) : Json();
   return JsonAnswer(answer);
 }

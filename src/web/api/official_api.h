@@ -33,6 +33,8 @@ class OfficialApi {
                          const HttpRequest& question);
   HttpResponse DecideHazard(const DecisionTarget& target, const std::string& official,
                             const DecisionBody& body);
+  HttpResponse ActAtDesk(const DecisionTarget& target, const std::string& official,
+                         const std::string& body);
   HttpResponse UndoHazard(const std::string& id, const std::string& official,
                           const DecisionBody& body);
   HttpResponse DecideMapChange(const DecisionTarget& target, const std::string& official,

@@ -17,6 +17,12 @@ constexpr DecisionAddress kAddresses[] = {
     {"/api/v1/hazards/", "/confirm", Decision::kConfirm},
     {"/api/v1/hazards/", "/reject", Decision::kReject},
     {"/api/v1/hazards/", "/undo", Decision::kUndo},
+    {"/api/v1/hazards/", "/close", Decision::kClose},
+    {"/api/v1/hazards/", "/comment", Decision::kComment},
+    {"/api/v1/hazards/", "/assign", Decision::kAssign},
+    {"/api/v1/hazards/", "/class", Decision::kClass},
+    {"/api/v1/hazards/", "/move", Decision::kMove},
+    {"/api/v1/hazards/", "/merge", Decision::kMerge},
     {"/api/v1/vehicles/", "/distrust", Decision::kDistrust},
     {"/api/v1/vehicles/", "/trust", Decision::kTrust},
     {"/api/v1/changes/", "/decision", Decision::kMapChange},
@@ -87,7 +93,8 @@ DecisionBody ParseDecisionBody(Decision decision, const std::string& body) {
   const nlohmann::json json = nlohmann::json::parse(body, nullptr, false);
   if (!json.is_object()) throw BadRequest("the body is no JSON object, " + kAccepted);
   DecisionBody read;
-  const bool may_be_seen = decision == Decision::kConfirm || decision == Decision::kReject;
+  const bool may_be_seen = decision == Decision::kConfirm || decision == Decision::kReject ||
+                           decision == Decision::kClose;
   for (const auto& [key, value] : json.items()) {
     if (key == "decision_id" && decision == Decision::kUndo) continue;
     if ((key == "sequence" || key == "position") && may_be_seen) continue;

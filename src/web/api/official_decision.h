@@ -12,15 +12,34 @@ namespace livemap::web {
 
 /// What an official may do with a hazard, with a vehicle (kDistrust, kTrust) or with a map change,
 /// whose decision stands in the body (kMapChange).
-enum class Decision { kConfirm, kReject, kUndo, kDistrust, kTrust, kMapChange };
+enum class Decision {
+  kConfirm,
+  kReject,
+  kUndo,
+  kDistrust,
+  kTrust,
+  kMapChange,
+  kClose,
+  kComment,
+  kAssign,
+  kClass,
+  kMove,
+  kMerge
+};
+
+/// Whether the decision leaves alone whether the hazard is there (zone::HazardDesk).
+constexpr bool IsDeskDecision(Decision decision) {
+  return decision == Decision::kComment || decision == Decision::kAssign ||
+         decision == Decision::kClass || decision == Decision::kMove ||
+         decision == Decision::kMerge;
+}
 
 /// Whether a GET of the decision's address says what the decision would do.
 constexpr bool HasPreview(Decision decision) { return decision == Decision::kDistrust; }
 
-/// The address of a decision: "/api/v1/hazards/UUID/reject", ".../confirm" or ".../undo",
-/// "/api/v1/vehicles/NAME/distrust" or ".../trust", "/api/v1/changes/UUID/decision"; none for any
-/// other. The id is
-/// not yet read.
+/// The address of a decision: "/api/v1/hazards/UUID/" with confirm, reject, undo, close, comment,
+/// assign, class, move or merge, "/api/v1/vehicles/NAME/distrust" or ".../trust",
+/// "/api/v1/changes/UUID/decision"; none for any other. The id is not yet read.
 struct DecisionTarget {
   Decision decision = Decision::kConfirm;
   std::string id;  ///< Of the hazard or the map change, or the vehicle's name.
@@ -37,12 +56,12 @@ struct DecisionBody {
   /// Of a confirmation or a rejection: what the official saw of the hazard.
   std::optional<zone::SeenHazard> seen;
 };
-/// Reads JSON `{"reason": TEXT}`, of an undo also `{"reason": TEXT, "decision_id": NUMBER}`, of a
-/// confirmation or a rejection also `{"reason": TEXT, "sequence": NUMBER, "position": [LONGITUDE,
-/// LATITUDE]}`, the position only with the sequence. The reason is printable UTF-8 of at most
-/// kMaxDecisionReasonBytes that is not all blanks. A rejection and a distrust need a reason; the
-/// others may have an empty body or leave the reason out. Throws BadRequest saying what is
-/// accepted.
+/// Of those that are no desk's. Reads JSON `{"reason": TEXT}`, of an undo also `{"reason": TEXT,
+/// "decision_id": NUMBER}`, of a confirmation, a rejection or a repair also `{"reason": TEXT,
+/// "sequence": NUMBER, "position": [LONGITUDE, LATITUDE]}`, the position only with the sequence.
+/// The reason is printable UTF-8 of at most kMaxDecisionReasonBytes that is not all blanks. A
+/// rejection and a distrust need a reason; the others may have an empty body or leave the reason
+/// out. Throws BadRequest saying what is accepted.
 DecisionBody ParseDecisionBody(Decision decision, const std::string& body);
 
 /// What an official decided about a map change.

@@ -157,9 +157,17 @@ DecisionsQuery ParseDecisionsQuery(const RequestTarget& target) {
       query.before = ParseSequence(value);
     } else if (name == "limit") {
       query.limit = ParseLimit(value, kMaxEventsPerAnswer);
+    } else if (name == "hazard") {
+      query.hazard = Uuid::Parse(value);
+      if (!query.hazard) {
+        throw BadRequest("hazard is " + Quoted(value) + ", accepted is the UUID of a hazard");
+      }
     } else {
-      RefuseUnknown(name, "accepted are before and limit");
+      RefuseUnknown(name, "accepted are before, limit and hazard");
     }
+  }
+  if (query.hazard && query.before != UINT64_MAX) {
+    throw BadRequest("before is not accepted beside hazard");
   }
   return query;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/uuid.h"
 #include "geo/geo_box.h"
 #include "orders/order.h"
 #include "web/http/request_target.h"
@@ -77,9 +78,10 @@ std::size_t ParseEventsQuery(const RequestTarget& target);
 struct DecisionsQuery {
   std::uint64_t before = UINT64_MAX;  ///< Only decisions with a lower id.
   std::size_t limit = 100;            ///< At most kMaxEventsPerAnswer.
+  std::optional<Uuid> hazard;         ///< Only about this one, the newest; not with `before`.
 };
 
-/// Reads `before` and `limit`; refuses every other parameter.
+/// Reads `before`, `limit` and `hazard`; refuses every other parameter.
 DecisionsQuery ParseDecisionsQuery(const RequestTarget& target);
 
 /// What `GET /api/v1/orders` asks for.

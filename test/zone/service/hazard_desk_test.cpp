@@ -250,7 +250,7 @@ TEST_F(HazardDeskTest, AStoreOfTheSchemaBeforeIsBroughtUpToDate) {
   SqliteDatabase(DatabasePath(), true)
       .Execute(
           "DROP TABLE decision_details; DROP TABLE assignments; DROP TABLE redirects; "
-          "DELETE FROM livemap_schema WHERE version >= 7");
+          "DELETE FROM livemap_schema WHERE version >= 8");
   EXPECT_EQ(Zone().DecisionsAbout(hazard, 10).at(0).reason, "seen");
   EXPECT_NE(Act(hazard, AssignTo("Roads")), 0U);
   EXPECT_NE(Act(hazard, MoveTo(NorthOf(5))), 0U);
