@@ -9,7 +9,12 @@ import { AttributionText, FitControl } from './layers/controls.js';
 import { byId, nextTask, throttled } from './dom.js';
 import { plural } from './format.js';
 import { Graticule } from './layers/graticule.js';
-import { HazardHistory } from './popups/hazard_history.js';
+import { AreaFilter } from './desk/area_filter.js';
+import { AssignmentList } from './desk/assignment_list.js';
+import { csvOf, geoJsonOf, saveFile } from './desk/export.js';
+import { StatisticsView } from './desk/statistics_view.js';
+import { HazardHistory } from './desk/time_line.js';
+import { WorkDialog } from './desk/work_dialog.js';
 import { HazardLayer } from './layers/hazard_layer.js';
 import { HazardList, hazardRow } from './panel/hazard_list.js';
 import { popupContent } from './popups/hazard_popup.js';
@@ -71,24 +76,47 @@ class Page {
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue, config.streets,
-        [this.history.section(hazard), ...this.officials.buttons(hazard)]),
+        [this.history.section(hazard),
+          ...this.officials.buttons(hazard, this.work.button(hazard))]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
-    this.history = new HazardHistory((id) => this.layer.redraw(id));
+    this.history = new HazardHistory((id) => this.layer.redraw(id),
+      (hazard, id) => this.officials.askUndo(hazard, id));
+    this.work = new WorkDialog(map, this.catalogue, {
+      onDone: (text, hazard, id) => {
+        this.officials.sayDoneAtDesk(text, hazard, id);
+        this.history.renew(hazard);
+      },
+      teams: () => this.assignments.teams(),
+      onClosed: (hazard) => this.focusPopup({ hazard }, 'work'),
+    });
     this.officials = new Officials(config.officials && session.role !== 'viewer', (text) => {
       this.say(text);
       this.trail.refresh();
+      this.assignments.refresh();
     }, (subject, focus) => this.focusPopup(subject, focus));
     this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
       this.sheet.coveredHeight(), () => this.stepAside(), (focus) => this.sheet.focusBack(focus));
     this.trail = new DecisionList((hazard, id) => this.officials.askUndo(hazard, id));
     this.review = new ReviewQueue((hazard) => this.choose(hazard), () => this.trail.refresh());
+    this.statistics = new StatisticsView();
     this.inView = byId('in-view');
     this.list = new HazardList(data, this.catalogue, (hazard) => this.choose(hazard),
       () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));
     this.filter = new ClassFilter(data, this.catalogue, () => this.showAll());
     this.states = new StateFilter(data, () => this.showAll(),
       config.officials ? (shown) => this.showRejected(shown) : null);
+    this.assignments = new AssignmentList((ids) => {
+      data.showOnly(ids);
+      this.showAll();
+    }, (hazard) => this.choose(hazard));
+    this.area = new AreaFilter(this.map, (corners) => {
+      data.showArea(corners);
+      this.showAll();
+    }, () => {
+      this.stepAside();
+      this.say('Tap the corners of the area on the map; the first one again ends it.');
+    });
     this.announced = { count: 0, first: '' };
     this.announceSoon = throttled(() => this.announce(), 800);
     /** Until somebody moves the map, it shows what the zone says. */
@@ -122,6 +150,9 @@ class Page {
       if (type === 'popupclose') popup.getElement()?.remove();
     });
     this.inView.addEventListener('change', () => this.list.refresh());
+    byId('export-geojson').addEventListener('click', () => this.saveList('hazards.geojson',
+      'application/geo+json', geoJsonOf));
+    byId('export-csv').addEventListener('click', () => this.saveList('hazards.csv', 'text/csv', csvOf));
     document.addEventListener('keydown', (event) => {
       if (event.key !== 'Escape' || document.querySelector('dialog[open]')) return;
       this.map.closePopup();
@@ -251,6 +282,15 @@ class Page {
     this.say(count === 1 ? `New hazard: ${first}`
       : `${count.toLocaleString('en')} new hazards, the first: ${first}`);
     this.announced = { count: 0, first: '' };
+  }
+
+  /** What is listed, all of it, as a file. */
+  async saveList(name, type, textOf) {
+    const { rows } = await this.data.ask('rows', 'hazards', {
+      offset: 0, limit: Infinity, box: this.list.box(), text: this.list.search.value,
+    });
+    saveFile(name, type, textOf(rows, (id) => this.assignments.of(id)));
+    this.say(`${plural(rows.length, 'hazard')} exported`);
   }
 
   /** To those who listen instead of looking. */

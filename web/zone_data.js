@@ -12,6 +12,9 @@ export class ZoneData {
     this.stateCounts = new Map();
     this.hiddenClasses = new Set();
     this.hiddenStates = new Set();
+    /** Ids of the only hazards that are shown, and the corners of the area in which they lie; null: all. */
+    this.onlyIds = null;
+    this.area = null;
     this.keepsRejected = false;
     this.worker = new Worker(new URL('./worker/zone_worker.js', import.meta.url), { type: 'module' });
     this.worker.addEventListener('message', (event) => this.receive(event.data));
@@ -71,7 +74,18 @@ export class ZoneData {
 
   tellFilter() {
     this.worker.postMessage({ type: 'filter', classes: [...this.hiddenClasses],
-      states: [...this.hiddenStates] });
+      states: [...this.hiddenStates], onlyIds: this.onlyIds, area: this.area });
+  }
+
+  showOnly(ids) {
+    this.onlyIds = ids;
+    this.tellFilter();
+  }
+
+  /** `corners`: [x, y] in units. */
+  showArea(corners) {
+    this.area = corners;
+    this.tellFilter();
   }
 
   /** From now on each event of this one comes as onWatched; of none with null. */

@@ -10,7 +10,9 @@ import { getJson } from '../zone_lists.js';
 const PAGE = 20;
 const DONE = {
   confirm: 'Confirmed', reject: 'Rejected', dismiss: 'Dismissed', distrust: 'Distrusted',
-  trust: 'Trusted again', undo: 'Took back a decision about',
+  trust: 'Trusted again', undo: 'Took back a decision about', comment: 'Commented on',
+  assign: 'Assigned', close: 'Closed as repaired', class: 'Changed the class of', move: 'Moved',
+  merge: 'Merged',
 };
 const SUBJECTS = { hazard: 'a hazard', map_change: 'a map change' };
 
@@ -52,12 +54,13 @@ export class DecisionList {
   row(decision) {
     const time = Date.parse(decision.time);
     const subject = SUBJECTS[decision.about] ?? decision.subject;
-    const changed = decision.hazards > 0 ? `, ${plural(decision.hazards, 'hazard')} changed` : '';
+    const changed = decision.about === 'vehicle' && decision.hazards > 0 ? `, ${plural(decision.hazards, 'hazard')} changed` : '';
+    const detail = decision.detail ? ` ${decision.detail}` : '';
     const isUndone = decision.undone_by !== null;
     const row = element('li', { class: isUndone ? 'trail-row trail-undone' : 'trail-row',
       'data-decision': decision.id },
     element('span', { class: 'trail-what' }, `${DONE[decision.decision] ?? decision.decision} ${
-      subject}${changed}`),
+      subject}${detail}${changed}`),
     element('time', { datetime: decision.time, title: localTime(time) }, ago(time)),
     element('span', { class: 'trail-who' }, [decision.official, decision.reason,
       isUndone ? 'taken back' : ''].filter((text) => text !== '').join(' \u00b7 ')));

@@ -144,6 +144,7 @@ export class HazardList {
     let next = this.list.firstChild;
     for (const hazard of hazards) {
       const row = this.rows.get(hazard.id) ?? this.add(hazard);
+      if (row.hazard.className !== hazard.className) this.rename(row, hazard);
       row.hazard = hazard;
       fill(row, hazard);
       place(row, indices.get(hazard.id));
@@ -168,6 +169,14 @@ export class HazardList {
     const row = { ...parts, item: element('li', {}, button), button, hazard, index: -1 };
     this.rows.set(hazard.id, row);
     return row;
+  }
+
+  /** An official has changed its class. */
+  rename(row, hazard) {
+    const { badge, label } = rowParts(this.catalogue, hazard);
+    row.badge.replaceWith(badge);
+    row.label.replaceWith(label);
+    Object.assign(row, { badge, label });
   }
 
   keepTabStop() {

@@ -126,6 +126,11 @@ export function decideOn(hazard, name, reason, undoes = undefined) {
   return ask(hazardSubject(hazard), decision, savedToken(), bodyOf({ hazard }, decision, reason, undoes));
 }
 
+/** Does at the desk what `call` names, as: ask. */
+export function actOn(hazard, call, body) {
+  return ask(hazardSubject(hazard), { call }, savedToken(), body);
+}
+
 function sentenceFor(status, error, subject, isNamed) {
   if (status === 401 && session.decides()) return 'Your session has ended. Reload the page and log in.';
   if (status === 401) return 'This token is not known here. Check it and try again.';
@@ -206,11 +211,11 @@ export class Officials {
     return this.dialog.open;
   }
 
-  /** The buttons of a hazard's popup; nothing where nobody may decide. */
-  buttons(hazard) {
+  /** The buttons of a hazard's popup, with `more`; nothing where nobody may decide. */
+  buttons(hazard, more = []) {
     const offered = hazard.state === REJECTED.name
       ? ['restore', 'undo'] : ['confirm', 'reject', 'undo'];
-    return this.row(hazardSubject(hazard), offered);
+    return this.row(hazardSubject(hazard), offered, more);
   }
 
   /** Those of a map change's popup. */
@@ -223,7 +228,7 @@ export class Officials {
     return this.row(vehicleSubject(vehicle), ['distrust', 'trust']);
   }
 
-  row(subject, offered) {
+  row(subject, offered, more = []) {
     if (!this.enabled) return [];
     return [element('div', { class: 'decisions' }, ...offered.map((name) => {
       const { call, focus = call, button, bad } = DECISIONS[name];
@@ -231,7 +236,7 @@ export class Officials {
         class: bad ? 'decide decide-reject' : 'decide' }, `${button}\u2026`);
       node.onclick = () => this.ask(subject, DECISIONS[name]);
       return node;
-    }))];
+    }), ...more)];
   }
 
   /** Of the decision with that id alone. */
@@ -314,6 +319,15 @@ export class Officials {
       undoes: told.properties?.decision_id } : null;
     byId('notice-text').textContent = text;
     byId('notice-undo').hidden = this.last === null;
+    this.notice.hidden = false;
+    this.onDone(text);
+  }
+
+  /** What was done at the desk, with a button that takes it back. */
+  sayDoneAtDesk(text, hazard, decisionId) {
+    this.last = { subject: hazardSubject(hazard), decision: DECISIONS.undo, undoes: decisionId };
+    byId('notice-text').textContent = text;
+    byId('notice-undo').hidden = false;
     this.notice.hidden = false;
     this.onDone(text);
   }

@@ -19,6 +19,17 @@ function grown(array, capacity) {
   return larger;
 }
 
+/** Whether the place lies within the corners, by how many edges lie to its east. */
+function isWithin(corners, x, y) {
+  let inside = false;
+  for (let i = 0, j = corners.length - 1; i < corners.length; j = i, i += 1) {
+    const [xi, yi] = corners[i];
+    const [xj, yj] = corners[j];
+    if ((yi > y) !== (yj > y) && x < xi + ((xj - xi) * (y - yi)) / (yj - yi)) inside = !inside;
+  }
+  return inside;
+}
+
 export class PointTable {
   /** `groupOf(record)` and `stateOf(record)` answer small numbers by which records are hidden. */
   constructor(groupOf, stateOf) {
@@ -26,6 +37,10 @@ export class PointTable {
     this.stateOf = stateOf;
     this.hiddenGroups = new Uint8Array(256);
     this.hiddenStates = new Uint8Array(256);
+    /** Only records of these ids are shown; null: of all. */
+    this.onlyIds = null;
+    /** Only what lies within these corners, [x, y] in units, is shown; null: everything. */
+    this.area = null;
     this.clear();
   }
 
@@ -126,7 +141,16 @@ export class PointTable {
   }
 
   isShown(slot) {
-    return this.hiddenGroups[this.group[slot]] === 0 && this.hiddenStates[this.state[slot]] === 0;
+    return this.hiddenGroups[this.group[slot]] === 0 && this.hiddenStates[this.state[slot]] === 0
+      && (this.onlyIds === null || this.onlyIds.has(this.records[slot].id))
+      && (this.area === null || this.isInArea(slot));
+  }
+
+  /** The corners may have been drawn in another world than that of 0 to 1. */
+  isInArea(slot) {
+    const { x, y, area } = this;
+    const worlds = Math.round(area[0][0] - x[slot]);
+    return isWithin(area, x[slot] + worlds, y[slot]);
   }
 
   /** The shown ones, the newest first, from number `offset` on at most `limit`; in the `box` of

@@ -130,7 +130,9 @@ class Zone {
     this.vehicles.clear();
   }
 
-  filter({ classes, states }) {
+  filter({ classes, states, onlyIds, area }) {
+    this.hazards.onlyIds = onlyIds === null ? null : new Set(onlyIds);
+    this.hazards.area = area;
     this.hazards.hiddenGroups.fill(0);
     this.hazards.hiddenStates.fill(0);
     for (const name of classes) {
