@@ -117,8 +117,7 @@ void CheckDeskText(const DeskAction& action) {
 
 }  // namespace
 
-HazardDesk::HazardDesk(const ZoneConfig& config, ZoneState& state, HazardSteps& steps)
-    : config_(config), state_(state), steps_(steps) {}
+HazardDesk::HazardDesk(ZoneState& state, HazardSteps& steps) : state_(state), steps_(steps) {}
 
 HazardDesk::Slot HazardDesk::SlotOnMap(const Uuid& hazard, const char* which) const {
   const auto slot = state_.hazards.Find(hazard);

@@ -9,7 +9,6 @@
 #include "zone/desk/redirects.h"
 #include "zone/model/decision.h"
 #include "zone/service/hazard_steps.h"
-#include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_transaction.h"
 
@@ -32,8 +31,8 @@ class HazardDesk {
     std::uint64_t dropped = 0;      ///< The decision whose redirect fell; 0: none.
   };
 
-  /// All outlive it.
-  HazardDesk(const ZoneConfig& config, ZoneState& state, HazardSteps& steps);
+  /// Both outlive it.
+  HazardDesk(ZoneState& state, HazardSteps& steps);
 
   /// Whether the hazard is known. Throws Error for an action that is not acceptable (a text, the
   /// class), and DecisionConflict for one that does not fit what is there: the hazard or the other
@@ -77,7 +76,6 @@ class HazardDesk {
              ZoneTransaction& transaction);
   std::optional<Assignment> AssignmentOf(const Uuid& hazard) const;
 
-  const ZoneConfig& config_;
   ZoneState& state_;
   HazardSteps& steps_;
 };

@@ -43,7 +43,7 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
       map_changes_(config_, state_, places_),
       polls_(config_, state_, steps_, images_, pictures_, allowance_, vehicles_, places_),
       officials_(config_, state_, steps_),
-      desk_(config_, state_, steps_),
+      desk_(state_, steps_),
       ageing_(state_, steps_) {
   state_.damage += places_.Load();
   sequence_ = state_.sequence;
