@@ -180,6 +180,39 @@ TEST_F(AccessTest, AViewerAndAStrangerDecideNothing) {
       << "a program's token no longer counts";
 }
 
+TEST_F(AccessTest, AtTheDeskAViewerAForgedTokenAndAStrangerDoNothing) {
+  const std::string hazard = Add();
+  const Browser official = LogIn("miller");
+  const Browser viewer = LogIn("jones");
+  const std::pair<const char*, const char*> decisions[] = {
+      {"comment", R"({"text": "asked the water works"})"},
+      {"assign", R"({"team": "Roads"})"},
+      {"class", R"({"class": "debris"})"},
+      {"move", R"({"position": [-79.9436, 40.4434]})"},
+      {"merge", R"({"other": "00000000-0000-4000-8000-000000000001"})"},
+      {"close", "{}"}};
+  for (const auto& [what, body] : decisions) {
+    const std::string target = "/api/v1/hazards/" + hazard + "/" + what;
+    EXPECT_EQ(Request(port(), "POST", target, viewer.ThatDecides(), body).status, 403) << what;
+    EXPECT_EQ(Post(target, body).status, 401) << what;
+    Browser forged = official;
+    forged.csrf_token = viewer.csrf_token;
+    EXPECT_EQ(Request(port(), "POST", target, forged.ThatDecides(), body).status, 403) << what;
+  }
+  EXPECT_TRUE(Get(port(), "/api/v1/decisions", official.WithCookie()).Json()["decisions"].empty());
+}
+
+TEST_F(AccessTest, WhatTheDeskReadsIsForThoseWhoHaveLoggedIn) {
+  const std::string hazard = Add();
+  const Browser viewer = LogIn("jones");
+  for (const std::string& target :
+       {std::string("/api/v1/assignments"), std::string("/api/v1/statistics"),
+        "/api/v1/decisions?hazard=" + hazard, "/api/v1/hazards/" + hazard + "/sightings"}) {
+    EXPECT_EQ(Get(port(), target).status, 401) << target;
+    EXPECT_EQ(Get(port(), target, viewer.WithCookie()).status, 200) << target;
+  }
+}
+
 TEST_F(AccessTest, AStolenSessionIsWorthNothingAfterTheLogOut) {
   const std::string hazard = Add();
   const Browser browser = LogIn("miller");
