@@ -18,6 +18,12 @@ bool Redirects::IsPlaced(const Uuid& hazard) const {
   });
 }
 
+bool Redirects::IsMergedAway(const Uuid& hazard) const {
+  return std::any_of(redirects_.begin(), redirects_.end(), [&](const Redirect& redirect) {
+    return redirect.kind == DecisionKind::kMergeHazard && redirect.from == hazard;
+  });
+}
+
 std::optional<Uuid> Redirects::Follow(Uuid hazard,
                                       const std::function<bool(const Uuid&)>& is_there) const {
   // Each step goes to another hazard, unless the store was written by hand.

@@ -35,6 +35,8 @@ class Redirects {
   /// merged away leads on to the hazard into which it was.
   std::optional<Uuid> Find(const std::string& class_name, const geo::GeoPoint& position,
                            double radius_m, const std::function<bool(const Uuid&)>& is_there) const;
+  /// Whether the hazard is gone because it is another one.
+  bool IsMergedAway(const Uuid& hazard) const;
   /// Whether an official has said where the hazard lies.
   bool IsPlaced(const Uuid& hazard) const;
 

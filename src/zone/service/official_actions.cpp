@@ -383,7 +383,8 @@ bool OfficialActions::Restore(const Withdrawal& withdrawal, std::uint64_t vehicl
   // What was reported at its place since stands for it.
   const bool is_replaced =
       life.state == HazardState::kGone &&
-      state_.hazards.FindMatch(state_.hazards.ClassName(*slot), record.estimate.position);
+      (state_.redirects.IsMergedAway(record.uuid) ||
+       state_.hazards.FindMatch(state_.hazards.ClassName(*slot), record.estimate.position));
   if (is_replaced) return false;
   const bool was_decided =
       (life.state == HazardState::kRejected) != (before->state == HazardState::kRejected) ||

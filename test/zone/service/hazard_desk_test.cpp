@@ -215,6 +215,17 @@ TEST_F(HazardDeskTest, TwoHazardsBecomeOneAndCanBeSplitAgain) {
   EXPECT_EQ(ReportAt(NorthOf(20), "debris"), other);
 }
 
+TEST_F(HazardDeskTest, TrustInAVehicleDoesNotSplitWhatWasMerged) {
+  const Uuid kept = ReportAt(kDeskPlace);
+  const Uuid other = ReportAt(NorthOf(20));
+  const std::string witness = "car-" + std::to_string(vehicles_);
+  ASSERT_EQ(ReportAt(NorthOf(20)), other);
+  ASSERT_EQ(Zone().Distrust(witness, "Anna", "its key was stolen"), 1U);
+  Act(kept, MergeWith(other));
+  EXPECT_TRUE(Zone().Trust(witness, "Anna"));
+  EXPECT_EQ(Get(other).state, HazardState::kGone);
+}
+
 TEST_F(HazardDeskTest, AMergeNeedsTwoHazardsThatAreNear) {
   const Uuid kept = ReportAt(kDeskPlace);
   const Uuid far = ReportAt(NorthOf(120));
