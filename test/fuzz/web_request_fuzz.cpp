@@ -6,7 +6,6 @@
 
 #include "common/uuid.h"
 #include "web/access/official_authenticator.h"
-#include "web/api/official_decision.h"
 #include "web/api/query.h"
 #include "web/feeds/feed_query.h"
 #include "web/feeds/feed_text.h"
@@ -14,6 +13,7 @@
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/officials/official_decision.h"
 #include "web/ogc/ogc_query.h"
 #include "web/tiles/tile_file.h"
 

@@ -1,8 +1,8 @@
 #include "web/server/web_server.h"
 
-#include "web/api/api.h"
 #include "web/api/event_hub.h"
 #include "web/api/vehicle_trails.h"
+#include "web/server/api.h"
 #include "web/server/connection.h"
 #include "web/server/http_server.h"
 

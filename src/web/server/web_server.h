@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "protocol/hazard_catalogue.h"
-#include "web/api/api.h"
 #include "web/http/web_config.h"
+#include "web/server/api.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {

@@ -6,7 +6,7 @@
 
 #include "test/web/http/http_client.h"
 #include "test/web/zone_fixture.h"
-#include "web/api/official_decision.h"
+#include "web/officials/official_decision.h"
 #include "web/server/web_server.h"
 
 namespace livemap::web {

@@ -1,4 +1,4 @@
-#include "web/api/official_api.h"
+#include "web/officials/official_api.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "web/api/official_decision.h"
 #include "web/api/query.h"
+#include "web/officials/official_decision.h"
 #include "zone/desk/desk_action.h"
 
 namespace livemap::web {

@@ -1,4 +1,4 @@
-#include "web/api/official_decision.h"
+#include "web/officials/official_decision.h"
 
 #include <nlohmann/json.hpp>
 #include <utility>

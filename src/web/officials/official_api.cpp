@@ -1,9 +1,9 @@
-#include "web/api/official_api.h"
+#include "web/officials/official_api.h"
 
 #include "common/time.h"
-#include "web/api/desk_body.h"
 #include "web/http/request_body.h"
 #include "web/json/map_change_json.h"
+#include "web/officials/desk_body.h"
 
 namespace livemap::web {
 namespace {

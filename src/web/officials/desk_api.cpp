@@ -1,4 +1,4 @@
-#include "web/api/desk_api.h"
+#include "web/officials/desk_api.h"
 
 #include <algorithm>
 #include <set>
@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "web/api/desk_body.h"
 #include "web/api/hazard_api.h"
 #include "web/json/json.h"
+#include "web/officials/desk_body.h"
 
 namespace livemap::web {
 namespace {
@@ -18,7 +18,7 @@ constexpr std::int64_t kWeekNs = 7 * 86'400'000'000'000;
 constexpr std::size_t kMaxSightings = 200;
 constexpr std::size_t kMaxStreets = 100;
 constexpr std::size_t kDecisionsPerRead = 1000;
-constexpr std::size_t kHazardsPerRead = 500;
+constexpr std::size_t kDeskHazardsPerRead = 500;
 
 /// "2026-12-01" of its begin.
 std::string DayOf(std::int64_t time_ns) { return Rfc3339(time_ns).substr(0, 10); }
@@ -100,7 +100,7 @@ void DeskApi::CountHazards(zone::DeskStatistics& statistics, std::int64_t from_n
   zone::Walk<zone::HazardState> walk;  // Of every state.
   walk.until = zone_.Sequence();
   for (bool is_last = false; !is_last;) {
-    const auto page = zone_.ReadHazards(walk, kHazardsPerRead);
+    const auto page = zone_.ReadHazards(walk, kDeskHazardsPerRead);
     for (const zone::Hazard& hazard : page.items) {
       const bool counts =
           hazard.first_seen_ns >= from_ns || decided.count(hazard.uuid.ToString()) != 0;

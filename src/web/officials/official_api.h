@@ -3,9 +3,9 @@
 #include <string>
 
 #include "web/access/access.h"
-#include "web/api/official_decision.h"
 #include "web/api/query.h"
 #include "web/http/http_message.h"
+#include "web/officials/official_decision.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {

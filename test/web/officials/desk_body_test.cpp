@@ -1,4 +1,4 @@
-#include "web/api/desk_body.h"
+#include "web/officials/desk_body.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

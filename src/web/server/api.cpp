@@ -1,4 +1,4 @@
-#include "web/api/api.h"
+#include "web/server/api.h"
 
 #include <utility>
 

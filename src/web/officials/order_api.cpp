@@ -1,4 +1,4 @@
-#include "web/api/order_api.h"
+#include "web/officials/order_api.h"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "web/api/desk_body.h"
+#include "web/officials/desk_body.h"
 
 #include <array>
 #include <initializer_list>

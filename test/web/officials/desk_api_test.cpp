@@ -1,5 +1,5 @@
 // The officials' console by HTTP.
-#include "web/api/desk_api.h"
+#include "web/officials/desk_api.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
