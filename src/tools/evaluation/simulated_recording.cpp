@@ -29,7 +29,7 @@ constexpr double kFrameRateHz = 8;
 constexpr double kFrameJitterS = 0.02;
 constexpr int kJpegQuality = 60;
 /// Of the receiver's Doppler, per axis.
-constexpr double kVelocitySigmaMps = 0.1;
+constexpr double kReceiverVelocitySigmaMps = 0.1;
 constexpr double kStopMps = 0.2;
 constexpr double kTurnDeg = 20;
 constexpr double kTurnS = 5;
@@ -154,7 +154,7 @@ recordings::RecordedTrack LogOf(const simulation::VehicleMotion& motion, double 
     state.place = map.ToGeo(truth.world_from_base.translation().head<2>() + error_m);
     const Eigen::Vector2d velocity =
         (truth.world_from_base.linear() * truth.velocity_mps).head<2>() +
-        kVelocitySigmaMps * draw.random.Normal();
+        kReceiverVelocitySigmaMps * draw.random.Normal();
     state.speed_mps = velocity.norm();
     state.course_deg = std::atan2(velocity.x(), velocity.y()) / geo::kRadiansPerDegree;
     if (state.course_deg < 0) state.course_deg += 360;
