@@ -16,11 +16,9 @@ constexpr double kMinVisibleShare = 0.1;
 constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
-constexpr double kCoarser = 3;  // Than a fine alignment, in what has converged.
 constexpr float kNearestM = 0.01F;
 constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
 constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
-constexpr float kMiddleGrey = 128;     // Sums of squares about it keep their digits.
 constexpr double kMinGain = 0.25;      // A black image must not explain everything.
 
 /// Of the unknowns that are solved for; lies on the stack.
@@ -30,13 +28,6 @@ using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
 
 ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::size_t count) {
   return {values.data() + begin, static_cast<Eigen::Index>(count)};
-}
-
-/// Points that follow each other err together; so many are one part of the covariance. There must
-/// be clearly more parts than unknowns.
-std::size_t PartSize(std::size_t points) {
-  constexpr std::size_t kParts = 32, kLeast = 16;
-  return std::clamp(points / kParts, kLeast, kChunk);
 }
 
 /// What the covariance says of movements that no edge shows: all but nothing. Edges of one
@@ -102,91 +93,28 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
         residuals.visible[point] = 0;
         continue;
       }
-      residuals.value[point] =
-          whitening_[point] * (Interpolate(grey, u, v) - gain * points.intensity[point] - bias);
+      residuals.value[point] = Interpolate(grey, u, v) - gain * points.intensity[point] - bias;
+      if (!whitening_.empty()) residuals.value[point] *= whitening_[point];
       residuals.visible[point] = 1;
       ++residuals.count;
     }
   }
 }
 
-/// Residuals are divided by what they err by, as a multiple of the noise of a grey value: by the
-/// place of a steep edge, which is known to a part of a pixel only (Engel et al. 2018 weigh by the
-/// gradient, too), and by depths that are not exact, equation (12) of
-/// docs/explanation/monocular-odometry.md, at the motion that the alignment starts with.
+/// Residuals of points whose depth is not exact err by that, too: equation (12) of
+/// docs/explanation/monocular-odometry.md. They are divided by how much more, at the motion that
+/// the alignment starts with.
 void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
-  whitening_.resize(points.size());
-  const auto per_grey = static_cast<float>(1 / config_.grey_sigma);
-  const float per_slope = static_cast<float>(config_.place_sigma_px) * per_grey;
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
-    Eigen::Map<Eigen::ArrayXf>(whitening_.data() + begin, static_cast<Eigen::Index>(count)) =
-        1 + (per_slope * AlignerPart(points.slope, begin, count)).square();
-  }
-  if (!points.inverse_depth_sigma.empty()) {
-    const Eigen::Vector3f way =
-        (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
-    for (std::size_t i = 0; i < whitening_.size(); ++i) {
-      const float by_inverse_depth =
-          points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
-                         points.jacobian[2][i] * way.z());
-      const float more = by_inverse_depth * points.inverse_depth_sigma[i] * per_grey;
-      whitening_[i] += more * more;
-    }
-  }
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
-    Eigen::Map<Eigen::ArrayXf> factor(whitening_.data() + begin, static_cast<Eigen::Index>(count));
-    factor = factor.rsqrt();
-  }
-}
-
-/// Sets gain and bias so that the points have one spread and mean in both images, and corrects the
-/// current residuals. Fitted as the other unknowns, by the sum of squares, the gain would be too
-/// small: what errs in the reference counts there as contrast that the new image has not
-/// (regression dilution). Edges of a repeated pattern had a gain of a third, which all but explains
-/// anything.
-void Aligner::FitGain(const EdgePoints& points, double sigma, AlignmentState& state) {
-  const auto k = static_cast<float>(config_.huber_k * sigma);
-  const auto gain = static_cast<float>(state.gain), bias = static_cast<float>(state.bias);
-  double weights = 0, reference = 0, image = 0, square_reference = 0, square_image = 0;
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
-    const auto n = static_cast<Eigen::Index>(count);
-    const auto residual = AlignerPart(current_.value, begin, count);
-    const auto grey = AlignerPart(points.intensity, begin, count) - kMiddleGrey;
-    Chunk weight, seen;
-    const auto factor = AlignerPart(whitening_, begin, count);
-    // Squares of what is foreign must not count for more than others.
-    weight.head(n) = AlignerPart(current_.visible, begin, count) * factor.square() *
-                     (k / residual.abs().max(k)).square();
-    seen.head(n) = residual / factor;
-    seen.head(n) += gain * grey + (bias + (gain - 1) * kMiddleGrey);
-    weights += static_cast<double>(weight.head(n).sum());
-    reference += static_cast<double>((weight.head(n) * grey).sum());
-    image += static_cast<double>((weight.head(n) * seen.head(n)).sum());
-    square_reference += static_cast<double>((weight.head(n) * grey.square()).sum());
-    square_image += static_cast<double>((weight.head(n) * seen.head(n).square()).sum());
-  }
-  if (!(weights > 0)) return;
-  const double mean_reference = reference / weights, mean_image = image / weights;
-  const double of_reference = square_reference / weights - mean_reference * mean_reference;
-  const double of_image = square_image / weights - mean_image * mean_image;
-  if (!(of_reference > 1) || !(of_image > 0)) return;
-  const double middle = static_cast<double>(kMiddleGrey);
-  const AlignmentState before = state;
-  state.gain = std::clamp(std::sqrt(of_image / of_reference), kMinGain, 1 / kMinGain);
-  state.bias = mean_image + middle - state.gain * (mean_reference + middle);
-  const auto more_gain = static_cast<float>(state.gain - before.gain);
-  const auto more_bias = static_cast<float>(state.bias - before.bias);
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
-    const auto n = static_cast<Eigen::Index>(count);
-    Chunk change;
-    change.head(n) = AlignerPart(current_.visible, begin, count) *
-                     AlignerPart(whitening_, begin, count) *
-                     (more_gain * AlignerPart(points.intensity, begin, count) + more_bias);
-    Eigen::Map<Eigen::ArrayXf>(current_.value.data() + begin, n) -= change.head(n);
+  whitening_.resize(points.inverse_depth_sigma.size());
+  const Eigen::Vector3f way =
+      (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
+  const auto grey_sigma = static_cast<float>(config_.grey_sigma);
+  for (std::size_t i = 0; i < whitening_.size(); ++i) {
+    const float by_inverse_depth =
+        points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
+                       points.jacobian[2][i] * way.z());
+    const float more = by_inverse_depth * points.inverse_depth_sigma[i] / grey_sigma;
+    whitening_[i] = 1 / std::sqrt(1 + more * more);
   }
 }
 
@@ -231,9 +159,8 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
   gradient_.setZero();
   Eigen::Array<float, static_cast<int>(kChunk), kUnknowns> columns, weighted;
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
-  const std::size_t part_size = PartSize(points.size());
-  for (std::size_t begin = 0; begin < points.size(); begin += part_size) {
-    const std::size_t count = std::min(part_size, points.size() - begin);
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
     const auto n = static_cast<Eigen::Index>(count);
     const auto residual = AlignerPart(current_.value, begin, count);
     const auto visible = AlignerPart(current_.visible, begin, count);
@@ -243,14 +170,20 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
     }
     columns.col(6).head(n) = AlignerPart(points.intensity, begin, count);
     columns.col(7).head(n).setOnes();
-    const auto factor = AlignerPart(whitening_, begin, count);
-    Chunk weight_all, grey_levels;
-    weight_all.head(n) = visible * factor.square() * (k / residual.abs().max(k));
-    grey_levels.head(n) = residual / factor;
+    if (!whitening_.empty()) {
+      for (int i = 0; i < kUnknowns; ++i) {
+        columns.col(i).head(n) *= AlignerPart(whitening_, begin, count);
+      }
+    }
+    const Chunk weight_all = [&] {
+      Chunk weight;
+      weight.head(n) = visible * (k / residual.abs().max(k));
+      return weight;
+    }();
     Step part = Step::Zero();
     for (int i = 0; i < unknowns; ++i) {
       weighted.col(i).head(n) = weight_all.head(n) * columns.col(i).head(n);
-      part[i] = static_cast<double>((weighted.col(i).head(n) * grey_levels.head(n)).sum());
+      part[i] = static_cast<double>((weighted.col(i).head(n) * residual).sum());
       for (int j = 0; j <= i; ++j) {
         normal_(i, j) +=
             static_cast<double>((weighted.col(i).head(n) * columns.col(j).head(n)).sum());
@@ -285,30 +218,23 @@ bool Aligner::Solve(double damping, Step& step) const {
   return step.allFinite();
 }
 
-/// Equation (8). The twist was solved for times the gain, the one that goes with it.
+/// Equation (8). The twist was solved for times the gain.
 AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) const {
   AlignmentState moved = state;
+  moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / state.gain);
   moved.gain = std::clamp(state.gain + step[6], kMinGain, 1 / kMinGain);
   moved.bias += step[7];
-  moved.new_from_reference = state.new_from_reference * Se3Exp(-step.head<6>() / moved.gain);
   return moved;
 }
 
 AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
-                               const geo::CameraIntrinsics& camera, const AlignmentState& start,
-                               Precision precision) {
-  const double converged_px =
-      config_.converged_px * (precision == Precision::kCoarse ? kCoarser : 1);
+                               const geo::CameraIntrinsics& camera, const AlignmentState& start) {
   AlignmentResult result;
   result.state = start;
   result.points = points.size();
   Whiten(points, start.new_from_reference);
   Evaluate(points, grey, camera, start, current_);
   double sigma = RobustSigma(current_);
-  if (config_.estimate_illumination) {
-    FitGain(points, sigma, result.state);
-    sigma = RobustSigma(current_);
-  }
   double cost = RobustCost(current_, sigma);
   double damping = 0;
   bool stale = true;
@@ -325,26 +251,22 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
         camera.fx * (step.head<3>().norm() * points.mean_inverse_depth + step.segment<3>(3).norm());
     if (!(new_cost < cost)) {
       damping = std::max(kFirstDamping, damping * 10);
-      if (damping > kLastDamping || pixels < converged_px) break;
+      if (damping > kLastDamping || pixels < config_.converged_px) break;
       continue;
     }
     result.state = moved;
     std::swap(current_, candidate_);
     sigma = RobustSigma(current_);
-    if (config_.estimate_illumination) {
-      FitGain(points, sigma, result.state);
-      sigma = RobustSigma(current_);
-    }
     cost = RobustCost(current_, sigma);
     damping = damping > kFirstDamping ? damping / 10 : 0;
     stale = true;
-    if (pixels < converged_px) break;
+    if (pixels < config_.converged_px) break;
   }
   if (stale) BuildNormalEquations(points, sigma);
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
   Summarise(sigma, result);
-  CountExplained(points, result);
+  CountExplained(points, camera, result);
   return result;
 }
 
@@ -356,14 +278,18 @@ double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
   return RobustCost(candidate_, sigma);
 }
 
-void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) const {
+void Aligner::CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                             AlignmentResult& result) const {
+  const auto per_px_x = static_cast<float>(1 / camera.fx);
+  const auto per_px_y = static_cast<float>(1 / camera.fy);
   const auto gain = static_cast<float>(result.state.gain);
-  const auto per_slope = static_cast<float>(config_.place_sigma_px / config_.grey_sigma);
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);
-    const auto slope = AlignerPart(points.slope, begin, count);
+    const auto z = AlignerPart(points.z, begin, count);
+    const auto gradient_x = AlignerPart(points.jacobian[0], begin, count) * z * per_px_x;
+    const auto gradient_y = AlignerPart(points.jacobian[1], begin, count) * z * per_px_y;
     const auto bound =
-        (gain * kExplainedPx * slope).max(kNoiseGrey) / (1 + (per_slope * slope).square()).sqrt();
+        (gain * kExplainedPx * (gradient_x.square() + gradient_y.square()).sqrt()).max(kNoiseGrey);
     result.explained += static_cast<std::size_t>(
         ((AlignerPart(current_.value, begin, count).abs() <= bound).cast<float>() *
          AlignerPart(current_.visible, begin, count))
@@ -391,9 +317,7 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const Eigen::LDLT<UpToEight> factors(normal_.topLeftCorner(unknowns, unknowns));
   const UpToEight half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
   // Parts that the unknowns were fitted to contradict each other less than others would.
-  const std::size_t size = current_.value.size();
-  const double parts =
-      std::max(2.0, static_cast<double>(size) / static_cast<double>(6 * PartSize(size)));
+  const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
   const UpToEight whole = factors.solve(half.transpose());
   result.covariance =
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);

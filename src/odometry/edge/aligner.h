@@ -24,17 +24,11 @@ struct AlignmentConfig {
   int max_iterations = 12;  ///< Per level.
   double huber_k = 2.0;     ///< In standard deviations of the residuals.
   double min_sigma = 1.5;   ///< Noise below which no residual counts as an outlier, grey levels.
-  double grey_sigma = 2.0;  ///< Of residuals of gentle slopes whose depth is exact.
-  /// Of the place of an edge, px, as of a pixel that sees one ray (1/sqrt(12)): what is steep errs
-  /// by more grey levels.
-  double place_sigma_px = 0.3;
+  double grey_sigma = 2.0;  ///< Of residuals whose depth is exact, against those where it is not.
   double converged_px = 0.03;  ///< A step that moves points less than this is the last.
   bool estimate_illumination = true;
   bool rotation_only = false;
 };
-
-/// How far an alignment goes: one that a finer level takes up need not be exact.
-enum class Precision { kFine, kCoarse };
 
 struct AlignmentResult {
   AlignmentState state;
@@ -76,8 +70,7 @@ class Aligner {
 
   /// Aligns on one level from `start` on.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
-                        const geo::CameraIntrinsics& camera, const AlignmentState& start,
-                        Precision precision = Precision::kFine);
+                        const geo::CameraIntrinsics& camera, const AlignmentState& start);
 
   /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
   /// less than a tenth of the points is visible.
@@ -97,19 +90,19 @@ class Aligner {
 
   void Evaluate(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, Residuals& residuals) const;
-  void FitGain(const EdgePoints& points, double sigma, AlignmentState& state);
   double RobustSigma(const Residuals& residuals) const;
   double RobustCost(const Residuals& residuals, double sigma) const;
   void Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference);
   void BuildNormalEquations(const EdgePoints& points, double sigma);
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
-  void CountExplained(const EdgePoints& points, AlignmentResult& result) const;
+  void CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                      AlignmentResult& result) const;
   void Summarise(double sigma, AlignmentResult& result) const;
 
   AlignmentConfig config_;
   Residuals current_, candidate_;
-  std::vector<float> whitening_;  // Factors of the residuals.
+  std::vector<float> whitening_;  // Factors of the residuals; empty: all 1.
   Normal normal_;
   Normal scatter_;  // Sum over parts of the image of their gradient's square.
   Step gradient_;

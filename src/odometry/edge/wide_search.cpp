@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "odometry/se3.h"
 
@@ -20,12 +19,6 @@ constexpr std::size_t kFineSurvivors = 3;
 constexpr double kSameCandidatePx = 1.5;
 /// A rival whose score is this close to the best one's makes the outcome ambiguous.
 constexpr double kAmbiguousScore = 0.03;
-/// Whose score is larger than this share of the best one's may set the scale of residuals.
-constexpr double kContenderScore = 0.7;
-/// Of a level's share of the least cost in the likeness, and what noise adds to each cost, squared
-/// grey levels.
-constexpr double kLikenessPower = 1.0 / 6;
-constexpr double kCostOfNoise = 1;
 /// Of ProposeAround, rad, and how many turns of each.
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;
@@ -115,7 +108,7 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
   const ShiftSearch::Shifts shifts = shifts_.Find(keyframe.images.thumbnail(), images.thumbnail());
   if (shifts.count == 0) return false;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(cameras_.levels)];
-  const double depth_m = 1 / std::max(1e-3, keyframe.finest_points().mean_inverse_depth);
+  const double depth_m = 1 / std::max(1e-3, keyframe.points[0].mean_inverse_depth);
   for (const ShiftSearch::Shift& shift : shifts) {
     const double right = shift.x / camera.fx, down = shift.y / camera.fy;
     proposals.Add(MotionOfTwist(0, 0, 0, -down, right, 0));
@@ -126,53 +119,20 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
   return true;
 }
 
-/// How much larger a candidate's residuals are than the best one's counts on every level: edges
-/// that repeat themselves lie beside each other within what is explained, and beside their own they
-/// leave less. The likeness is the geometric mean over the levels of the share of the least cost.
-void WideSearch::Weigh(const EdgePoints& points, const cv::Mat& grey, int level) {
-  const auto end = candidates_.begin() + static_cast<std::ptrdiff_t>(count_);
-  const auto best =
-      std::max_element(candidates_.begin(), end,
-                       [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
-  double sigma = best->result.sigma;
-  for (auto candidate = candidates_.begin(); candidate != end; ++candidate) {
-    if (candidate->score > kContenderScore * best->score) {
-      sigma = std::min(sigma, candidate->result.sigma);
-    }
-  }
-  std::array<double, MotionProposals::kMost> costs{};
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < count_; ++i) {
-    const AlignmentState& state = candidates_[i].result.state;
-    // What fades the reference's contrast lowers every residual.
-    const double gain = std::min(1.0, state.gain);
-    costs[i] = aligner_.CostAt(points, grey, cameras_.camera[static_cast<std::size_t>(level)],
-                               state, sigma) /
-                   (gain * gain) +
-               kCostOfNoise;
-    if (candidates_[i].score > kContenderScore * best->score) least = std::min(least, costs[i]);
-  }
-  for (std::size_t i = 0; i < count_; ++i) {
-    const double share = std::isfinite(costs[i]) ? std::min(1.0, least / costs[i]) : 0;
-    candidates_[i].likeness *= std::pow(share, kLikenessPower);
-    candidates_[i].score *= candidates_[i].likeness;
-  }
-}
-
 /// Aligns the candidates on a level and keeps the best that differ.
 void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
-                        Precision precision, const Plausibility& plausibility) {
+                        const Plausibility& plausibility) {
   const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
-    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state, precision);
-    const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
-    candidate.score = IsBelievableMove(motion, points.mean_inverse_depth)
-                          ? ExplainedScore(candidate.result) * plausibility(motion)
-                          : 0;
+    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
+    const bool believable =
+        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
+    candidate.score = believable ? ExplainedScore(candidate.result) *
+                                       plausibility(candidate.result.state.new_from_reference)
+                                 : 0;
   }
-  Weigh(points, grey, level);
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::size_t kept = 0;
@@ -190,7 +150,8 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
 }
 
 WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,
-                                       const Reference& reference) {
+                                       const PointsOfLevel& points_of,
+                                       const Plausibility& plausibility) {
   Outcome outcome;
   count_ = 0;
   for (const Eigen::Isometry3d& motion : proposals) {
@@ -199,13 +160,11 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   }
   if (count_ == 0) return outcome;
   double mean_inverse_depth = 0;
-  for (int level = cameras_.levels - 1; level >= reference.finest_level; --level) {
-    const EdgePoints& points = reference.points_of(level);
-    Refine(points, images[level], level,
-           level > reference.finest_level ? Precision::kCoarse : Precision::kFine,
-           reference.plausibility);
-    mean_inverse_depth = points.mean_inverse_depth;
+  for (int level = cameras_.levels - 1; level >= 0; --level) {
+    const EdgePoints& points = points_of(level);
+    Refine(points, images[level], level, plausibility);
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
+    mean_inverse_depth = points.mean_inverse_depth;
   }
   outcome.best = candidates_[0].result;
   for (std::size_t i = 1; i < count_ && !outcome.ambiguous; ++i) {

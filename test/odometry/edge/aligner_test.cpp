@@ -188,22 +188,6 @@ TEST(Aligner, GainAndBiasAreFoundAndDoNotMoveThePose) {
   EXPECT_LT(Se3Log(result.state.new_from_reference * motion).norm(), 1e-3);
 }
 
-TEST(Aligner, NoiseOfBothImagesDoesNotDiluteTheGain) {
-  const SyntheticWall wall(kWallCamera);
-  RgbdFrame reference = wall.See(1, Eigen::Isometry3d::Identity());
-  RgbdFrame moved = wall.See(2, Pose(0.004, 0.002, 0, 0, 0, 0.002));
-  cv::RNG random(5);
-  for (cv::Mat* grey : {&reference.grey, &moved.grey}) {
-    cv::Mat noise(grey->size(), CV_16SC1);
-    random.fill(noise, cv::RNG::NORMAL, 0, 25);
-    cv::add(*grey, noise, *grey, cv::noArray(), CV_8U);
-    cv::GaussianBlur(*grey, *grey, {3, 3}, 0);
-  }
-  const AlignmentResult result =
-      Aligner({}).Align(PointsOf(reference), moved.grey, kWallCamera, {});
-  EXPECT_NEAR(result.state.gain, 1, 0.06);
-}
-
 TEST(Aligner, AThirdOfForeignPixelsDoesNotMoveThePose) {
   const SyntheticWall wall(kWallCamera);
   const Eigen::Isometry3d motion = Pose(0.006, 0.002, 0, 0, 0, 0.004);
@@ -219,7 +203,6 @@ TEST(Aligner, NeverEndsWithAHigherCostThanItBeganWith) {
   const SyntheticWall wall(kWallCamera);
   const EdgePoints points = PointsOf(wall.See(1, Eigen::Isometry3d::Identity()));
   AlignmentConfig config;
-  config.estimate_illumination = false;  // Gain and bias are no minimum of the cost.
   Aligner aligner(config);
   for (int i = 0; i < 12; ++i) {
     const double far = 0.02 * i;
@@ -227,7 +210,7 @@ TEST(Aligner, NeverEndsWithAHigherCostThanItBeganWith) {
     const AlignmentResult result = aligner.Align(points, grey, kWallCamera, {});
     const double sigma = result.sigma;
     EXPECT_LE(aligner.CostAt(points, grey, kWallCamera, result.state, sigma),
-              aligner.CostAt(points, grey, kWallCamera, {}, sigma) * 1.0001 + 1e-9)
+              aligner.CostAt(points, grey, kWallCamera, {}, sigma) * 1.0001)
         << far;
   }
 }
@@ -239,9 +222,7 @@ TEST(Aligner, InformationIsTheInverseOfTheScatterOverManyNoisyImages) {
   const cv::Mat clean = wall.See(2, motion).grey;
   const EdgePoints points = PointsOf(reference);
   cv::RNG random(7);
-  AlignmentConfig config;
-  config.place_sigma_px = 0;  // Only grey values err.
-  Aligner aligner(config);
+  Aligner aligner({});
   double normalised = 0;
   const int images = 60;
   Vector6d mean = Vector6d::Zero();
