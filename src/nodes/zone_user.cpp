@@ -3,9 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <string>
@@ -14,6 +12,7 @@
 #include "accounts/account_store.h"
 #include "common/clock.h"
 #include "common/error.h"
+#include "common/utc_text.h"
 
 namespace {
 
@@ -121,19 +120,11 @@ Role RequireRole(const std::string& name) {
   throw Error("role '" + name + "' is not accepted, accepted are viewer, official and admin");
 }
 
-std::string Utc(std::int64_t at_ns) {
-  const std::time_t seconds = at_ns / 1'000'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text.data();
-}
-
 void List(const AccountStore& accounts) {
   if (!accounts.HasAccounts()) std::cerr << "livemap zone user: there are no accounts\n";
   for (const auto& account : accounts.List()) {
-    const std::string last = account.last_log_in ? Utc(*account.last_log_in) : "never logged in";
+    const std::string last =
+        account.last_log_in ? livemap::Rfc3339Seconds(*account.last_log_in) : "never logged in";
     std::cout << account.name << '\t' << livemap::accounts::RoleName(account.role) << '\t' << last
               << '\n';
   }

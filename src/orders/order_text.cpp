@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdio>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "common/text.h"
+#include "common/utc_text.h"
 #include "protocol/text_rules.h"
 
 namespace livemap::orders {
@@ -46,7 +46,7 @@ std::string DescriptionOf(const Order& order) {
   std::snprintf(confidence.data(), confidence.size(), "%.0f %%", 100 * content.confidence);
   return TitleOf(order) + "\nPosition (latitude, longitude): " + PositionText(order) +
          "\nSeen by vehicles, confidence " + confidence.data() + ", confirmed " +
-         UtcText(content.confirmed_ns) + "\nReference: " + ReferenceOf(order) + "\n";
+         Rfc3339Seconds(content.confirmed_ns) + "\nReference: " + ReferenceOf(order) + "\n";
 }
 
 std::string JsonOf(const Order& order) {
@@ -60,21 +60,12 @@ std::string JsonOf(const Order& order) {
                               {"longitude", content.position.longitude_deg},
                               {"place", nullptr},
                               {"confidence", content.confidence},
-                              {"confirmed", UtcText(content.confirmed_ns)},
+                              {"confirmed", Rfc3339Seconds(content.confirmed_ns)},
                               {"official", nullptr},
                               {"reason", content.reason}};
   if (!content.place.empty()) json["place"] = content.place;
   if (!content.official.empty()) json["official"] = content.official;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-std::string UtcText(std::int64_t time_ns) {
-  const std::time_t seconds = time_ns / 1'000'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text.data();
 }
 
 }  // namespace livemap::orders

@@ -22,7 +22,5 @@ std::string DescriptionOf(const Order& order);
 /// The order as one JSON object (docs/reference/work-orders.md), with the official's name and
 /// reason.
 std::string JsonOf(const Order& order);
-/// RFC 3339 in UTC, whole seconds: "2026-01-31T12:00:00Z", of nanoseconds since 1970.
-std::string UtcText(std::int64_t time_ns);
 
 }  // namespace livemap::orders

@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
+#include "common/utc_text.h"
 #include "recordings/time_text.h"
 
 namespace livemap::recordings {
@@ -75,7 +76,7 @@ RecordedTrack OrderTrack(std::vector<RecordedPosition> positions, std::vector<st
     const RecordedPosition& other = track.positions.back();
     if (geo::GeodesicDistanceM(position.position, other.position) > kSamePlaceM) {
       throw Error("lines " + std::to_string(other.line) + " and " + std::to_string(position.line) +
-                  " of '" + name + "' state two places at " + FormatUtc(position.stamp_ns) +
+                  " of '" + name + "' state two places at " + Rfc3339(position.stamp_ns) +
                   ", accepted is the track of one receiver");
     }
     repeated.Count(position.line);

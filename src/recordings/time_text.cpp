@@ -169,33 +169,4 @@ std::optional<std::int64_t> TimeOfFileName(const std::string& name) {
   return found;
 }
 
-std::string FormatUtc(std::int64_t stamp_ns) {
-  std::int64_t days = stamp_ns / (kDayS * kSecondNs);
-  std::int64_t rest_ns = stamp_ns % (kDayS * kSecondNs);
-  if (rest_ns < 0) {
-    rest_ns += kDayS * kSecondNs;
-    --days;
-  }
-  // Hinnant's civil_from_days.
-  days += 719468;
-  const std::int64_t era = (days >= 0 ? days : days - 146096) / 146097;
-  const std::int64_t day_of_era = days - era * 146097;
-  const std::int64_t year_of_era =
-      (day_of_era - day_of_era / 1460 + day_of_era / 36524 - day_of_era / 146096) / 365;
-  const std::int64_t day_of_year =
-      day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-  const std::int64_t shifted_month = (5 * day_of_year + 2) / 153;
-  const std::int64_t day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
-  const std::int64_t month = shifted_month < 10 ? shifted_month + 3 : shifted_month - 9;
-  const std::int64_t year = year_of_era + era * 400 + (month <= 2 ? 1 : 0);
-  const std::int64_t second = rest_ns / kSecondNs;
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%04lld-%02lld-%02lldT%02lld:%02lld:%02lld.%03lldZ",
-                static_cast<long long>(year), static_cast<long long>(month),
-                static_cast<long long>(day), static_cast<long long>(second / 3600),
-                static_cast<long long>(second / 60 % 60), static_cast<long long>(second % 60),
-                static_cast<long long>(rest_ns % kSecondNs / 1'000'000));
-  return text.data();
-}
-
 }  // namespace livemap::recordings

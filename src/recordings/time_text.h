@@ -30,7 +30,4 @@ std::optional<int> ParseZone(std::string_view text);
 /// recorder. `name` is without folder. None where there are none, or several that are times.
 std::optional<std::int64_t> TimeOfFileName(const std::string& name);
 
-/// "2026-01-31T12:34:56.789Z".
-std::string FormatUtc(std::int64_t stamp_ns);
-
 }  // namespace livemap::recordings

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/utc_text.h"
 #include "recordings/positions/gpx_track.h"
 #include "recordings/positions/nmea_log.h"
 #include "recordings/positions/photo_list.h"
@@ -55,8 +56,8 @@ void OrderAnyClips(const std::uint8_t* data, std::size_t size) {
 
 void ReadAnyTime(const std::string& text) {
   const auto time = livemap::recordings::ParseTimeText(text);
-  if (time && !livemap::recordings::ParseTimeText(
-                  livemap::recordings::FormatUtc(time->stamp_ns + 86'400'000'000'000))) {
+  if (time &&
+      !livemap::recordings::ParseTimeText(livemap::Rfc3339(time->stamp_ns + 86'400'000'000'000))) {
     // A day later is a time too, but at the end of the years that are read.
     if (text.find("2105") == std::string::npos && text.find("2106") == std::string::npos) {
       __builtin_trap();

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/utc_text.h"
+
 namespace livemap::recordings {
 namespace {
 
@@ -39,8 +41,8 @@ TEST(TimeText, ALeapDayIsInLeapYearsAlone) {
 }
 
 TEST(TimeText, ATimeIsWrittenAsItIsRead) {
-  EXPECT_EQ(FormatUtc(kStamp + 250'000'000), "2026-01-31T12:34:56.250Z");
-  EXPECT_EQ(ParseTimeText(FormatUtc(kStamp))->stamp_ns, kStamp);
+  EXPECT_EQ(Rfc3339(kStamp + 250'000'000), "2026-01-31T12:34:56.250Z");
+  EXPECT_EQ(ParseTimeText(Rfc3339(kStamp))->stamp_ns, kStamp);
 }
 
 TEST(TimeText, ZonesHaveSignHoursAndMinutes) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "common/utc_text.h"
 #include "orders/order_text.h"
 #include "orders/secret_file.h"
 
@@ -100,8 +101,8 @@ Open311Sender::Found Open311Sender::FindPosted(const Order& order, const std::st
   call.max_answer_bytes = kMaxListBytes;
   call.url = WithJurisdiction(
       config_.url + "/requests.json?service_code=" + NetworkClient::Escaped(service) +
-      "&start_date=" + NetworkClient::Escaped(UtcText(order.uncertain_ns - kClockSlackNs)) +
-      "&end_date=" + NetworkClient::Escaped(UtcText(now_ns_() + kClockSlackNs)));
+      "&start_date=" + NetworkClient::Escaped(Rfc3339Seconds(order.uncertain_ns - kClockSlackNs)) +
+      "&end_date=" + NetworkClient::Escaped(Rfc3339Seconds(now_ns_() + kClockSlackNs)));
   const HttpAnswer answer = client_.Call(call);
   const auto list = answer.IsSuccess() ? ParseOpen311(answer.body) : std::nullopt;
   if (!list) {

@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
+#include "common/utc_text.h"
 #include "recordings/time_text.h"
 
 namespace livemap::recordings {
@@ -23,7 +24,7 @@ void Attach(const Clip& before, Clip& clip, std::vector<std::string>& notes) {
   if (gap_s < -kClipToleranceS) {
     std::ostringstream sentence;
     sentence << "the videos '" << before.path << "' and '" << clip.path << "' overlap by " << -gap_s
-             << " s by their clocks, the second begins at " << FormatUtc(*clip.start_ns)
+             << " s by their clocks, the second begins at " << Rfc3339(*clip.start_ns)
              << ": accepted are the pieces of one recording";
     throw Error(sentence.str());
   }

@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
+#include "common/utc_text.h"
 #include "recordings/clock/clip_motion.h"
 #include "recordings/clock/clock_offset.h"
 #include "recordings/video/clip_sequence.h"
@@ -106,13 +107,11 @@ std::string NamesAndTimes(const Recording& recording) {
   const std::string& first = recording.clips.front().path;
   const std::string& last = recording.clips.back().path;
   return "'" + first + "'" + (last == first ? "" : " to '" + last + "'") + ", " +
-         recordings::FormatUtc(recording.begin_ns()) + " to " +
-         recordings::FormatUtc(recording.end_ns());
+         Rfc3339(recording.begin_ns()) + " to " + Rfc3339(recording.end_ns());
 }
 
 std::string NamesAndTimes(const std::string& name, const recordings::RecordedTrack& track) {
-  return name + ", " + recordings::FormatUtc(track.begin_ns()) + " to " +
-         recordings::FormatUtc(track.end_ns());
+  return name + ", " + Rfc3339(track.begin_ns()) + " to " + Rfc3339(track.end_ns());
 }
 
 /// Where the positions come from, as CommandLine has it.
@@ -134,8 +133,8 @@ void CheckOffset(const Recording& recording, const recordings::RecordedTrack& tr
   std::ostringstream sentence;
   sentence << "--offset " << offset_s << " brings no frame into the track's times: the recording, "
            << NamesAndTimes(recording) << " by its own clock, becomes "
-           << recordings::FormatUtc(recording.begin_ns() + offset_ns) << " to "
-           << recordings::FormatUtc(recording.end_ns() + offset_ns) << ", and the track is "
+           << Rfc3339(recording.begin_ns() + offset_ns) << " to "
+           << Rfc3339(recording.end_ns() + offset_ns) << ", and the track is "
            << NamesAndTimes(track_name, track) << "; accepted is what has to be added, from "
            << std::ceil(Seconds(track.begin_ns() - recording.end_ns())) << " to "
            << std::floor(Seconds(track.end_ns() - recording.begin_ns()))

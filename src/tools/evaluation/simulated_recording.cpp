@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/time.h"
+#include "common/utc_text.h"
 #include "datasets/camera_file.h"
 #include "datasets/seeded_random.h"
 #include "datasets/sensors/gnss_receiver_model.h"
@@ -109,7 +110,7 @@ std::string GpxPoint(const MeasuredState& state, bool velocities) {
   }
   std::snprintf(text, sizeof text, "<trkpt lat=\"%.7f\" lon=\"%.7f\"><time>%s</time>%s</trkpt>\n",
                 state.place.latitude_deg, state.place.longitude_deg,
-                recordings::FormatUtc(state.stamp_ns).c_str(), motion);
+                Rfc3339(state.stamp_ns).c_str(), motion);
   return text;
 }
 
@@ -124,7 +125,7 @@ std::string NmeaAngle(double degrees, int digits, const char* sides) {
 }
 
 std::string RmcSentence(const MeasuredState& state) {
-  const std::string utc = recordings::FormatUtc(state.stamp_ns);  // 2026-01-31T12:34:56.789Z
+  const std::string utc = Rfc3339(state.stamp_ns);  // 2026-01-31T12:34:56.789Z
   char body[160];
   std::snprintf(body, sizeof body, "GNRMC,%s%s%s,A,%s,%s,%.3f,%.2f,%s%s%s,,,A",
                 utc.substr(11, 2).c_str(), utc.substr(14, 2).c_str(), utc.substr(17, 6).c_str(),

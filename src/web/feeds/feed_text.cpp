@@ -118,9 +118,4 @@ std::string CsvText(std::string_view text) {
   return must_quote ? '"' + field + '"' : field;
 }
 
-std::string SecondsText(std::int64_t time_ns) {
-  constexpr std::size_t kToSeconds = 19;
-  return Rfc3339(time_ns).substr(0, kToSeconds) + 'Z';
-}
-
 }  // namespace livemap::web

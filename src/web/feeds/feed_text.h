@@ -23,7 +23,4 @@ void AppendFixed(std::string& text, double number, int digits);
 /// spreadsheet would take for a formula begins with an apostrophe.
 std::string CsvText(std::string_view text);
 
-/// RFC 3339 in UTC with whole seconds, "2026-01-31T12:00:00Z".
-std::string SecondsText(std::int64_t time_ns);
-
 }  // namespace livemap::web

@@ -2,10 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
-#include <ctime>
+
+#include "common/utc_text.h"
 
 namespace livemap::web {
 namespace {
@@ -56,24 +55,6 @@ Json PositionSigma(const Eigen::Matrix2d& covariance_m2) {
 
 std::string ToText(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string Rfc3339(std::int64_t time_ns) {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  std::int64_t seconds = time_ns / kNsPerSecond;
-  std::int64_t rest_ns = time_ns % kNsPerSecond;
-  if (rest_ns < 0) {
-    rest_ns += kNsPerSecond;
-    --seconds;
-  }
-  const std::time_t time = seconds;
-  std::tm utc{};
-  gmtime_r(&time, &utc);
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%04d-%02d-%02dT%02d:%02d:%02d.%03dZ", utc.tm_year + 1900,
-                utc.tm_mon + 1, utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec,
-                static_cast<int>(rest_ns / 1'000'000));
-  return text.data();
 }
 
 const char* ActionName(zone::HazardAction action) {

@@ -20,9 +20,6 @@ using Json = nlohmann::ordered_json;
 /// never breaks an answer.
 std::string ToText(const Json& json);
 
-/// RFC 3339 in UTC with milliseconds, "2026-01-31T12:00:00.250Z", of nanoseconds since 1970.
-std::string Rfc3339(std::int64_t time_ns);
-
 /// Rounds to `digits` after the point: 1e-7 degree is a centimetre, and float32 noise such as
 /// 0.8700000047683716 helps nobody.
 double Rounded(double value, int digits);

@@ -1,5 +1,6 @@
 #include "web/json/log_line.h"
 
+#include "common/utc_text.h"
 #include "web/json/json.h"
 
 namespace livemap::web {

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstdio>
 
+#include "common/utc_text.h"
 #include "protocol/change_class.h"
 
 namespace livemap::web {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/utc_text.h"
 #include "web/api/hazard_api.h"
 #include "web/json/json.h"
 #include "web/officials/desk_body.h"
@@ -19,9 +20,6 @@ constexpr std::size_t kMaxSightings = 200;
 constexpr std::size_t kMaxStreets = 100;
 constexpr std::size_t kDecisionsPerRead = 1000;
 constexpr std::size_t kDeskHazardsPerRead = 500;
-
-/// "2026-12-01" of its begin.
-std::string DayOf(std::int64_t time_ns) { return Rfc3339(time_ns).substr(0, 10); }
 
 void AddCounts(const zone::DeskCounts& counts, Json& json) {
   json["opened"] = counts.opened;
@@ -62,7 +60,7 @@ HttpResponse DeskApi::Assignments() const {
   for (const zone::Assignment& assignment : zone_.Assignments()) {
     list.push_back({{"hazard", assignment.hazard.ToString()},
                     {"team", assignment.team},
-                    {"due", assignment.due_ns == 0 ? Json() : Json(DayOf(assignment.due_ns))},
+                    {"due", assignment.due_ns == 0 ? Json() : Json(UtcDay(assignment.due_ns))},
                     {"overdue", assignment.IsOverdue(now_ns)},
                     {"since", Rfc3339(assignment.since_ns)},
                     {"decision_id", assignment.decision}});
@@ -150,7 +148,7 @@ HttpResponse DeskApi::Statistics(std::size_t weeks) const {
   }
   Json& of_weeks = answer["weeks"] = Json::array();
   for (const auto& [week_ns, counts] : statistics.by_week()) {
-    Json line{{"week", DayOf(week_ns)}};
+    Json line{{"week", UtcDay(week_ns)}};
     AddCounts(counts, line);
     of_weeks.push_back(std::move(line));
   }

@@ -1,6 +1,7 @@
 #include "web/officials/official_api.h"
 
 #include "common/time.h"
+#include "common/utc_text.h"
 #include "web/http/request_body.h"
 #include "web/json/map_change_json.h"
 #include "web/officials/desk_body.h"

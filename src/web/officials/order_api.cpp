@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "common/utc_text.h"
 #include "web/http/request_body.h"
 #include "web/json/json.h"
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/utc_text.h"
 #include "web/access/access.h"
 #include "web/http/server_address.h"
 #include "web/json/json.h"

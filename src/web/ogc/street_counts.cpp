@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/utc_text.h"
 #include "streets/street_place.h"
 #include "zone/model/hazard_spot.h"
 

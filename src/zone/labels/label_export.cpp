@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -14,6 +13,7 @@
 #include "common/error.h"
 #include "common/sqlite.h"
 #include "common/text_file.h"
+#include "common/utc_text.h"
 #include "zone/model/decision.h"
 
 namespace livemap::zone {
@@ -131,15 +131,6 @@ std::vector<std::string> ClassesOf(const BoxesByPicture& boxes) {
   return {names.begin(), names.end()};
 }
 
-std::string LabelUtc(std::int64_t at_ns) {
-  const std::time_t seconds = at_ns / 1'000'000'000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text.data();
-}
-
 /// A field of a table in CSV (RFC 4180). What a spreadsheet would take for a formula is none.
 std::string CsvField(const std::string& text) {
   const bool is_formula = !text.empty() && std::string("=+-@").find(text[0]) != std::string::npos;
@@ -220,7 +211,8 @@ class LabelWriter {
   void AddDecision(const std::string& picture, const KnownHazard& hazard) {
     decisions_ += picture + "," + hazard.uuid + "," + hazard.class_name + "," +
                   (hazard.verdict->is_confirmed ? "confirm" : "reject") + "," +
-                  CsvField(hazard.verdict->official) + "," + LabelUtc(hazard.verdict->at_ns) + "\n";
+                  CsvField(hazard.verdict->official) + "," + Rfc3339Seconds(hazard.verdict->at_ns) +
+                  "\n";
   }
 
   const fs::path store_;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <utility>
 #include <vector>
 
 #include "common/error.h"
 #include "common/number_text.h"
+#include "common/utc_text.h"
 #include "protocol/text_rules.h"
 
 namespace livemap::zone {
@@ -78,20 +78,11 @@ std::optional<std::pair<Uuid, PresenceRecord>> UnpackMerged(const std::string& t
   return std::pair(*hazard, *life);
 }
 
-/// "2026-12-01" of the day's begin.
-std::string DayText(std::int64_t day_ns) {
-  const auto seconds = static_cast<std::time_t>(day_ns / 1'000'000'000);
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[16];
-  return {text, std::strftime(text, sizeof(text), "%Y-%m-%d", &parts)};
-}
-
 std::string Metres(double distance_m) { return std::to_string(std::lround(distance_m)) + " m"; }
 
 std::string DetailOf(const DeskAction& action) {
   if (action.team.empty()) return "to nobody";
-  return "to " + action.team + (action.due_ns == 0 ? "" : ", due " + DayText(action.due_ns));
+  return "to " + action.team + (action.due_ns == 0 ? "" : ", due " + UtcDay(action.due_ns));
 }
 
 DecisionRecord MakeDeskRecord(const Uuid& hazard, const std::string& official,

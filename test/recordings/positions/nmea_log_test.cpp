@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "common/error.h"
+#include "common/utc_text.h"
 #include "recordings/time_text.h"
 
 namespace livemap::recordings {
@@ -46,7 +47,7 @@ TEST(NmeaLog, TheSentencesOfOneTimeAreOnePosition) {
       "a.nmea");
   ASSERT_THAT(track.positions, SizeIs(2));
   const RecordedPosition& first = track.positions[0];
-  EXPECT_EQ(FormatUtc(first.stamp_ns), "2026-01-31T12:34:56.000Z");
+  EXPECT_EQ(Rfc3339(first.stamp_ns), "2026-01-31T12:34:56.000Z");
   EXPECT_NEAR(first.position.latitude_deg, 48.25, 1e-9);
   EXPECT_NEAR(first.position.longitude_deg, -9.5, 1e-9);
   EXPECT_NEAR(*first.speed_mps, 10, 1e-3);
@@ -54,7 +55,7 @@ TEST(NmeaLog, TheSentencesOfOneTimeAreOnePosition) {
   EXPECT_DOUBLE_EQ(*first.altitude_m, 210);
   EXPECT_NEAR(*first.sigma_m, std::sqrt(12.5), 1e-9);
   const RecordedPosition& second = track.positions[1];
-  EXPECT_EQ(FormatUtc(second.stamp_ns), "2026-01-31T12:34:57.000Z");
+  EXPECT_EQ(Rfc3339(second.stamp_ns), "2026-01-31T12:34:57.000Z");
   EXPECT_DOUBLE_EQ(*second.course_deg, 45);
   EXPECT_NEAR(*second.speed_mps, 5.144, 1e-3);
 }
@@ -65,11 +66,11 @@ TEST(NmeaLog, ATimeAfterMidnightIsOfTheNextDay) {
                     Sentence("GPGGA,000000.5,4815.000,N,00930.000,W,1,08,0.9,210.0,M,47.0,M,,"),
                 "a.nmea");
   ASSERT_THAT(track.positions, SizeIs(2));
-  EXPECT_EQ(FormatUtc(track.positions[1].stamp_ns), "2026-01-01T00:00:00.500Z");
+  EXPECT_EQ(Rfc3339(track.positions[1].stamp_ns), "2026-01-01T00:00:00.500Z");
 }
 
 TEST(NmeaLog, YearsOfTwoDigitsAre1980To2079) {
-  EXPECT_EQ(FormatUtc(ParseNmea(Rmc("000000", "010199") + Rmc("000001", "010199"), "a").begin_ns()),
+  EXPECT_EQ(Rfc3339(ParseNmea(Rmc("000000", "010199") + Rmc("000001", "010199"), "a").begin_ns()),
             "1999-01-01T00:00:00.000Z");
 }
 

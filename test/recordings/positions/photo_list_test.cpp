@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
+#include "common/utc_text.h"
 #include "recordings/time_text.h"
 
 namespace livemap::recordings {
@@ -40,7 +41,7 @@ TEST(PhotoList, PhotosAreInTheOrderOfTheirCameraTimes) {
   ASSERT_THAT(list.photos, SizeIs(2));
   EXPECT_EQ(list.photos[0].path, "a.jpg");
   EXPECT_NEAR(*list.photos[0].position.speed_mps, 10, 1e-9);
-  EXPECT_EQ(FormatUtc(list.photos[1].position.stamp_ns), "2026-01-31T12:34:57.500Z");
+  EXPECT_EQ(Rfc3339(list.photos[1].position.stamp_ns), "2026-01-31T12:34:57.500Z");
 }
 
 TEST(PhotoList, TheZoneOfTheCamerasClockComesFromTheReceiver) {
@@ -51,7 +52,7 @@ TEST(PhotoList, TheZoneOfTheCamerasClockComesFromTheReceiver) {
                      "\"GPSDateTime\":\"2026:01:31 12:34:56Z\"") +
           "," + PhotoEntry("b.jpg", ",\"DateTimeOriginal\":\"2026:01:31 14:35:00\"") + "]",
       std::nullopt, "photos");
-  EXPECT_EQ(FormatUtc(list.photos[1].position.stamp_ns), "2026-01-31T12:35:00.000Z");
+  EXPECT_EQ(Rfc3339(list.photos[1].position.stamp_ns), "2026-01-31T12:35:00.000Z");
   EXPECT_THAT(list.notes, Contains(HasSubstr("120 minutes ahead of UTC")));
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
+#include "common/utc_text.h"
 #include "recordings/time_text.h"
 
 namespace livemap::recordings {
@@ -29,7 +30,7 @@ TEST(PositionTable, ColumnsAreFoundByTheirNames) {
       std::nullopt, "a.csv");
   ASSERT_THAT(track.positions, SizeIs(2));
   EXPECT_DOUBLE_EQ(track.positions[0].position.longitude_deg, 9.5);
-  EXPECT_EQ(FormatUtc(track.positions[1].stamp_ns), "2026-01-31T12:34:57.500Z");
+  EXPECT_EQ(Rfc3339(track.positions[1].stamp_ns), "2026-01-31T12:34:57.500Z");
   EXPECT_FALSE(track.positions[1].speed_mps);
   EXPECT_THAT(track.notes, Contains(HasSubstr("1 lines without a position")));
 }
@@ -44,14 +45,14 @@ TEST(PositionTable, BetweenSemicolonsACommaIsTheDecimalMark) {
   const RecordedTrack track = ParsePositionTable(
       "time;lat;lon\n1769862896000;48,25;9,5\n1769862897000;48,25;9,5\n", std::nullopt, "a.csv");
   EXPECT_DOUBLE_EQ(track.positions[0].position.latitude_deg, 48.25);
-  EXPECT_EQ(FormatUtc(track.positions[0].stamp_ns), "2026-01-31T12:34:56.000Z");
+  EXPECT_EQ(Rfc3339(track.positions[0].stamp_ns), "2026-01-31T12:34:56.000Z");
 }
 
 TEST(PositionTable, ATimeWithoutAZoneNeedsOne) {
   const std::string table = "time,lat,lon\n2026-01-31 14:34:56,1,2\n2026-01-31 14:34:57,1,2\n";
   EXPECT_THAT(TableRefusal(table), HasSubstr("line 2 of 'a.csv' has the time '2026-01-31 14:34:56' "
                                              "without a zone: --time-zone"));
-  EXPECT_EQ(FormatUtc(ParsePositionTable(table, 7200, "a.csv").begin_ns()),
+  EXPECT_EQ(Rfc3339(ParsePositionTable(table, 7200, "a.csv").begin_ns()),
             "2026-01-31T12:34:56.000Z");
 }
 

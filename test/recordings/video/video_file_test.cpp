@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/utc_text.h"
 #include "test/support/temporary_directory.h"
 
 namespace livemap::recordings {
@@ -30,7 +31,7 @@ std::string Refusal(const std::string& path) {
 TEST(VideoFile, FramesHaveTheTimesThatTheFileStates) {
   VideoFile video(Film("film.mp4"), {});
   EXPECT_EQ(video.size(), cv::Size(64, 48));
-  EXPECT_EQ(FormatUtc(video.creation_ns().value_or(0)), "2026-01-31T12:34:56.000Z");
+  EXPECT_EQ(Rfc3339(video.creation_ns().value_or(0)), "2026-01-31T12:34:56.000Z");
   EXPECT_EQ(video.duration_ns(), 600'000'000);
   std::vector<std::int64_t> times_ns;
   while (const auto frame = video.Next()) {

@@ -49,9 +49,5 @@ TEST(AppendCoordinate, WritesNoExponent) {
   EXPECT_EQ(text, "-0.0000001");
 }
 
-TEST(SecondsText, IsRfc3339) {
-  EXPECT_EQ(SecondsText(1'767'225'600'250'000'000), "2026-01-01T00:00:00Z");
-}
-
 }  // namespace
 }  // namespace livemap::web

@@ -327,12 +327,5 @@ TEST_F(ApiTest, ATakenPortIsAClearError) {
   }
 }
 
-TEST(Rfc3339, WritesMillisecondsOfAnyStamp) {
-  EXPECT_EQ(Rfc3339(0), "1970-01-01T00:00:00.000Z");
-  EXPECT_EQ(Rfc3339(1'500'999'999), "1970-01-01T00:00:01.500Z");
-  EXPECT_EQ(Rfc3339(-1'000'000), "1969-12-31T23:59:59.999Z");
-  EXPECT_EQ(Rfc3339(1'767'225'600'250'000'000), "2026-01-01T00:00:00.250Z");
-}
-
 }  // namespace
 }  // namespace livemap::web

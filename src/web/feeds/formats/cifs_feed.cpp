@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/utc_text.h"
 #include "geo/wgs84.h"
 #include "web/feeds/feed_text.h"
 #include "web/json/json.h"
@@ -21,7 +22,7 @@ void AppendCifsPoint(std::string& polyline, const geo::GeoPoint& point) {
 
 /// ISO 8601 with an offset, as the specification's examples have it.
 std::string CifsTime(std::int64_t time_ns) {
-  std::string time = SecondsText(time_ns);
+  std::string time = Rfc3339Seconds(time_ns);
   time.pop_back();
   return time + "+00:00";
 }

@@ -1,5 +1,6 @@
 #include "web/feeds/formats/datex_feed.h"
 
+#include "common/utc_text.h"
 #include "web/feeds/feed_text.h"
 #include "web/json/json.h"
 

@@ -1,5 +1,6 @@
 #include "web/feeds/formats/georss_feed.h"
 
+#include "common/utc_text.h"
 #include "web/feeds/feed_text.h"
 #include "web/json/json.h"
 
@@ -37,7 +38,7 @@ void GeoRssFeed::Add(const FeedHazard& hazard, std::string& text) {
   AppendElement(text, "summary",
                 std::string(zone::HazardStateName(fact.state)) + ", seen " +
                     std::to_string(fact.sightings) + " times, last at " +
-                    SecondsText(fact.last_seen_ns));
+                    Rfc3339Seconds(fact.last_seen_ns));
   // Latitude first, as GeoRSS has it.
   text += "<georss:point>";
   AppendCoordinate(text, fact.position.latitude_deg);

@@ -1,5 +1,6 @@
 #include "web/feeds/formats/gpx_feed.h"
 
+#include "common/utc_text.h"
 #include "web/feeds/feed_text.h"
 
 namespace livemap::web {
@@ -11,7 +12,7 @@ void GpxFeed::Begin(const FeedHead& head, std::string& text) {
       "<metadata>";
   AppendElement(text, "name", head.publisher);
   text += "<link href=\"" + XmlText(head.self) + "\"/>";
-  AppendElement(text, "time", SecondsText(head.now_ns));
+  AppendElement(text, "time", Rfc3339Seconds(head.now_ns));
   text += "</metadata>\n";
 }
 
@@ -21,7 +22,7 @@ void GpxFeed::Add(const FeedHazard& hazard, std::string& text) {
   text += "\" lon=\"";
   AppendCoordinate(text, hazard.hazard.position.longitude_deg);
   text += "\">";
-  AppendElement(text, "time", SecondsText(hazard.hazard.last_seen_ns));
+  AppendElement(text, "time", Rfc3339Seconds(hazard.hazard.last_seen_ns));
   AppendElement(text, "name", hazard.label);
   const std::string place = hazard.Place();
   if (!place.empty()) AppendElement(text, "desc", place);

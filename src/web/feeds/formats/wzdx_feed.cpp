@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "common/utc_text.h"
 #include "web/feeds/feed_text.h"
 #include "web/json/json.h"
 
@@ -98,16 +99,16 @@ Json WorkZoneFeature(const WorkZones& zones, const WorkZones::Zone& zone) {
                                 {"road_names", RoadNames(zones, zone)},
                                 {"direction", DirectionOf(zones, zone)},
                                 {"description", DevicesText(zone)},
-                                {"creation_date", SecondsText(times.first->first_seen_ns)},
-                                {"update_date", SecondsText(times.updated_ns)}};
+                                {"creation_date", Rfc3339Seconds(times.first->first_seen_ns)},
+                                {"update_date", Rfc3339Seconds(times.updated_ns)}};
   const std::string begins = CrossStreet(zones.name(zone.front().near));
   const std::string ends = CrossStreet(zones.name(zone.back().near));
   if (!begins.empty()) properties["beginning_cross_street"] = begins;
   if (!ends.empty()) properties["ending_cross_street"] = ends;
   properties["is_start_position_verified"] = false;
   properties["is_end_position_verified"] = false;
-  properties["start_date"] = SecondsText(times.first->first_seen_ns);
-  properties["end_date"] = SecondsText(times.ends_ns);
+  properties["start_date"] = Rfc3339Seconds(times.first->first_seen_ns);
+  properties["end_date"] = Rfc3339Seconds(times.ends_ns);
   properties["is_start_date_verified"] = false;
   properties["is_end_date_verified"] = false;
   properties["location_method"] = LocationMethod(zone);
@@ -125,7 +126,7 @@ Json WorkZoneFeature(const WorkZones& zones, const WorkZones::Zone& zone) {
 
 void WzdxFeed::Begin(const FeedHead& head, std::string& text) {
   Json info;
-  info["update_date"] = SecondsText(head.now_ns);
+  info["update_date"] = Rfc3339Seconds(head.now_ns);
   info["publisher"] = head.publisher;
   info["version"] = "4.2";
   info["data_sources"] =
