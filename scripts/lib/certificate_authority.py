@@ -16,6 +16,7 @@ import tempfile
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import pkcs7
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from broker_files import ZONE_USER, Usage, require_id, sync_folder, write_private
@@ -27,6 +28,8 @@ AUTHORITY_DAYS = 3650
 # A clock that is a little behind must not find a new certificate "not yet valid".
 BACKDATED = datetime.timedelta(hours=1)
 HOST_PATTERN = re.compile(r"(?=.{1,253}\Z)[A-Za-z0-9]([A-Za-z0-9-]{0,62})(\.[A-Za-z0-9]([A-Za-z0-9-]{0,62}))*")
+# As src/directory/signed_document.h has it.
+DIRECTORY_SIGNER = "zone directory"
 # By these names the zone's own bridge reaches a broker on the same machine.
 OWN_HOSTS = ["127.0.0.1", "localhost"]
 
@@ -170,6 +173,13 @@ class Authority:
         if hosts:
             builder = builder.add_extension(alternative_names(hosts), critical=False)
         return builder.sign(self.key, hashes.SHA256())
+
+    def sign_directory(self, content, life):
+        """The bytes with a signature around them (CMS SignedData, RFC 5652), by a key that is used once and forgotten."""
+        key = ec.generate_private_key(ec.SECP256R1())
+        certificate = self.sign(DIRECTORY_SIGNER, key.public_key(), life, ExtendedKeyUsageOID.EMAIL_PROTECTION)
+        return (pkcs7.PKCS7SignatureBuilder().set_data(content).add_signer(certificate, key, hashes.SHA256())
+                .sign(serialization.Encoding.DER, [pkcs7.PKCS7Options.Binary, pkcs7.PKCS7Options.NoCapabilities]))
 
     def issue_folder(self, folder, certificate_of):
         """Makes `folder` with a new key, its certificate and the authority's, all at once."""
