@@ -161,7 +161,8 @@ TEST(ZoneDirectory, ABombOfPolygonsIsRefused) {
   Json ring = Json::array();
   for (int i = 0; i < 50'001; ++i) ring.push_back({-80 + 1e-6 * i, 40});
   EXPECT_THAT(WhyNot(Collection({Zone("a", ring)})), HasSubstr("at most 50000 of all"));
-  EXPECT_THAT(WhyNotText(std::string((2 << 20) + 1, ' ')), HasSubstr("accepted are at most 2097152"));
+  EXPECT_THAT(WhyNotText(std::string((2 << 20) + 1, ' ')),
+              HasSubstr("accepted are at most 2097152"));
   EXPECT_THAT(WhyNotText(std::string(1 << 20, '[')), HasSubstr("nests values more than 12 deep"));
   EXPECT_THAT(WhyNotText(R"({"version": 1e999})"), HasSubstr("a number that is too large"));
 }
