@@ -113,13 +113,7 @@ void NameTheFile(const std::string& address, HttpResponse& answer) {
 
 }  // namespace
 
-FeedApi::FeedApi(const WebConfig& options, zone::ZoneService& zone,
-                 const protocol::HazardCatalogue& catalogue, Clock now_ns)
-    : options_(options),
-      zone_(zone),
-      catalogue_(catalogue),
-      now_ns_(std::move(now_ns)),
-      tags_(SystemNs()) {}
+FeedApi::FeedApi(FeedSource source) : source_(std::move(source)), tags_(SystemNs()) {}
 
 HttpResponse FeedApi::Answer(const RequestTarget& target, const HttpRequest& question,
                              const Visibility& sees) const {
@@ -138,7 +132,8 @@ HttpResponse FeedApi::Answer(const RequestTarget& target, const HttpRequest& que
     const bool all = sees.candidates && !feed.for_drivers;
     if (!query.since && StatesOf(query, all).empty()) return LogInFirst();
     const FeedHead head = HeadOf(question);
-    const std::string tag = tags_.TagOf(zone_.Sequence(), head.now_ns, head.base, question, sees);
+    const std::string tag =
+        tags_.TagOf(source_.zone.Sequence(), head.now_ns, head.base, question, sees);
     if (auto unchanged = ChangeTags::Unchanged(tag, question)) return *std::move(unchanged);
     auto slot = feed.gathers ? slots_.Take() : nullptr;
     if (feed.gathers && !slot) return MakeBusyAnswer("too many of these feeds are being made now");
@@ -151,7 +146,7 @@ HttpResponse FeedApi::Answer(const RequestTarget& target, const HttpRequest& que
 }
 
 HttpResponse FeedApi::List(const HttpRequest& question) const {
-  const std::string base = ServerAddress(options_, question);
+  const std::string base = ServerAddress(source_.options, question);
   Json feeds = Json::array();
   for (const Feed& feed : kFeeds) {
     feeds.push_back({{"title", feed.title}, {"href", base + feed.address}, {"type", feed.type}});
@@ -166,25 +161,26 @@ HttpResponse FeedApi::List(const HttpRequest& question) const {
 HttpResponse FeedApi::OneDenm(const std::string& id) const {
   const auto uuid = Uuid::Parse(id);
   if (!uuid) throw BadRequest("the hazard's id is no UUID");
-  const auto hazard = zone_.Find(*uuid);
+  const auto hazard = source_.zone.Find(*uuid);
   if (!hazard || hazard->announced_sequence == 0) {
     return MakeErrorAnswer(404, "drivers were told of no hazard with this id");
   }
-  return JsonAnswer(DenmJson(MakeHazard(*hazard, now_ns_())));
+  return JsonAnswer(DenmJson(MakeHazard(*hazard, source_.now_ns())));
 }
 
 FeedHead FeedApi::HeadOf(const HttpRequest& question) const {
   FeedHead head;
-  head.base = ServerAddress(options_, question);
+  head.base = ServerAddress(source_.options, question);
   head.self = head.base + question.target;
-  head.publisher = options_.feed_publisher.empty() ? options_.title : options_.feed_publisher;
-  head.country = options_.feed_country;
-  head.now_ns = now_ns_();
+  head.publisher = source_.options.feed_publisher.empty() ? source_.options.title
+                                                          : source_.options.feed_publisher;
+  head.country = source_.options.feed_country;
+  head.now_ns = source_.now_ns();
   return head;
 }
 
 FeedHazard FeedApi::MakeHazard(const zone::Hazard& hazard, std::int64_t now_ns) const {
-  return MakeFeedHazard(hazard, catalogue_, zone_.WordsOf(hazard), now_ns);
+  return MakeFeedHazard(hazard, source_.catalogue, source_.zone.WordsOf(hazard), now_ns);
 }
 
 HttpResponse FeedApi::Stream(std::shared_ptr<FeedFormat> format, const char* type,
@@ -193,7 +189,7 @@ HttpResponse FeedApi::Stream(std::shared_ptr<FeedFormat> format, const char* typ
   zone::Walk<zone::HazardState> walk;
   walk.box = query.box;
   walk.after = query.since.value_or(0);
-  walk.until = zone_.Sequence();  // Before the first read.
+  walk.until = source_.zone.Sequence();  // Before the first read.
   walk.states = StatesOf(query, all);
   auto pieces = [this, format = std::move(format), head, query = std::move(query),
                  walk = std::move(walk), all, slot = std::move(slot), is_begun = false,
@@ -201,7 +197,7 @@ HttpResponse FeedApi::Stream(std::shared_ptr<FeedFormat> format, const char* typ
     if (!is_begun) format->Begin(head, piece);
     is_begun = true;
     if (is_read) return format->End(piece);
-    const auto page = zone_.ReadHazards(walk, kHazardsPerRead);
+    const auto page = source_.zone.ReadHazards(walk, kHazardsPerRead);
     for (const zone::Hazard& hazard : page.items) {
       if (!all && hazard.announced_sequence == 0) continue;
       if (!query.classes.empty() && query.classes.count(hazard.class_name) == 0) continue;

@@ -1,21 +1,17 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 
-#include "common/clock.h"
-#include "protocol/hazard_catalogue.h"
 #include "web/feeds/change_tags.h"
 #include "web/feeds/feed_format.h"
 #include "web/feeds/feed_query.h"
+#include "web/feeds/feed_source.h"
 #include "web/feeds/gathering_slots.h"
 #include "web/http/http_message.h"
 #include "web/http/request_target.h"
 #include "web/http/site.h"
-#include "web/http/web_config.h"
-#include "zone/service/zone_service.h"
 
 namespace livemap::web {
 
@@ -27,11 +23,7 @@ constexpr const char* kFeedAddress = "/feeds";
 /// Thread-safe; store failures and bad requests come out as exceptions.
 class FeedApi {
  public:
-  using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
-
-  /// Keeps the references.
-  FeedApi(const WebConfig& options, zone::ZoneService& zone,
-          const protocol::HazardCatalogue& catalogue, Clock now_ns = SystemNs);
+  explicit FeedApi(FeedSource source);
 
   /// `target.path` starts with kFeedAddress.
   HttpResponse Answer(const RequestTarget& target, const HttpRequest& question,
@@ -46,10 +38,7 @@ class FeedApi {
   FeedHead HeadOf(const HttpRequest& question) const;
   FeedHazard MakeHazard(const zone::Hazard& hazard, std::int64_t now_ns) const;
 
-  const WebConfig& options_;
-  zone::ZoneService& zone_;
-  const protocol::HazardCatalogue& catalogue_;
-  const Clock now_ns_;
+  const FeedSource source_;
   const ChangeTags tags_;
   mutable GatheringSlots slots_;
 };

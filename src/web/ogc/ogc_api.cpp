@@ -103,21 +103,16 @@ bool WasSeenIn(const OgcQuery& query, const Item& item) {
 
 }  // namespace
 
-OgcApi::OgcApi(const WebConfig& options, zone::ZoneService& zone,
-               const protocol::HazardCatalogue& catalogue, Clock now_ns)
-    : options_(options),
-      zone_(zone),
-      catalogue_(catalogue),
-      now_ns_(std::move(now_ns)),
-      tags_(SystemNs()) {}
+OgcApi::OgcApi(FeedSource source) : source_(std::move(source)), tags_(SystemNs()) {}
 
 HttpResponse OgcApi::Answer(const RequestTarget& target, const HttpRequest& question,
                             const Visibility& sees) const {
   if (!sees.told) return LogInFirst();
-  const std::string server = ServerAddress(options_, question);
-  const Asked asked{target,   sees, server, server + kOgcAddress, server + question.target,
-                    now_ns_()};
-  const std::string tag = tags_.TagOf(zone_.Sequence(), asked.now_ns, server, question, sees);
+  const std::string server = ServerAddress(source_.options, question);
+  const Asked asked{target,          sees, server, server + kOgcAddress, server + question.target,
+                    source_.now_ns()};
+  const std::string tag =
+      tags_.TagOf(source_.zone.Sequence(), asked.now_ns, server, question, sees);
   try {
     HttpResponse answer = Route(asked);
     if (answer.status != 200) return answer;
@@ -134,10 +129,11 @@ HttpResponse OgcApi::Route(const Asked& asked) const {
     return RouteCollection(asked, rest.substr(kCollectionPrefix.size()));
   }
   RefuseQueryParameters(asked.target);
-  if (rest.empty() || rest == "/") return JsonAnswer(OgcLandingPage(asked.base, options_.title));
+  if (rest.empty() || rest == "/")
+    return JsonAnswer(OgcLandingPage(asked.base, source_.options.title));
   if (rest == "/conformance") return JsonAnswer(OgcConformance());
   if (rest == "/api") {
-    return JsonAnswer(OgcOpenApi(asked.base, options_.title, Collections(asked.sees)),
+    return JsonAnswer(OgcOpenApi(asked.base, source_.options.title, Collections(asked.sees)),
                       kOpenApiType);
   }
   if (rest == "/collections") {
@@ -174,7 +170,7 @@ std::vector<OgcCollection> OgcApi::Collections(const Visibility& sees) const {
     collections.push_back(
         {kMapChanges, "Map changes", "Objects beside the road that came or went, as points."});
   }
-  if (sees.told && zone_.streets() != nullptr) {
+  if (sees.told && source_.zone.streets() != nullptr) {
     collections.push_back({kStreets, "Streets with hazards",
                            "Ways of OpenStreetMap on which hazards lie, with their counts."});
   }
@@ -183,7 +179,7 @@ std::vector<OgcCollection> OgcApi::Collections(const Visibility& sees) const {
 
 zone::Walk<zone::HazardState> OgcApi::HazardWalk(const Visibility& sees) const {
   zone::Walk<zone::HazardState> walk;
-  walk.until = zone_.Sequence();
+  walk.until = source_.zone.Sequence();
   for (const zone::HazardState state : zone::StatesOnMap()) {
     if (sees.candidates || zone::IsTold(state)) walk.states.insert(state);
   }
@@ -207,12 +203,14 @@ HttpResponse OgcApi::Hazards(const Asked& asked, const OgcQuery& query) const {
   return WalkAnswer(
       FeatureWriter(asked.server, asked.target, asked.now_ns), asked.self, std::move(walk),
       query.limit,
-      [this](const auto& where, std::size_t limit) { return zone_.ReadHazards(where, limit); },
+      [this](const auto& where, std::size_t limit) {
+        return source_.zone.ReadHazards(where, limit);
+      },
       [this, query, sees = asked.sees](const zone::Hazard& hazard) {
         return MaySee(hazard, sees) && WasSeenIn(query, hazard);
       },
       [this](const zone::Hazard& hazard) {
-        return HazardFeature(hazard, catalogue_, zone_.WordsOf(hazard));
+        return HazardFeature(hazard, source_.catalogue, source_.zone.WordsOf(hazard));
       });
 }
 
@@ -220,12 +218,14 @@ HttpResponse OgcApi::MapChanges(const Asked& asked, const OgcQuery& query) const
   zone::Walk<zone::MapChangeState> walk;
   walk.box = query.box;
   walk.after = query.cursor;
-  walk.until = zone_.Sequence();
+  walk.until = source_.zone.Sequence();
   walk.states = zone::OpenStates();
   return WalkAnswer(
       FeatureWriter(asked.server, asked.target, asked.now_ns), asked.self, std::move(walk),
       query.limit,
-      [this](const auto& where, std::size_t limit) { return zone_.ReadMapChanges(where, limit); },
+      [this](const auto& where, std::size_t limit) {
+        return source_.zone.ReadMapChanges(where, limit);
+      },
       [query](const zone::MapChangeFeature& change) { return WasSeenIn(query, change); },
       MapChangeGeoJson);
 }
@@ -237,10 +237,10 @@ HttpResponse OgcApi::Streets(const Asked& asked, const OgcQuery& query) const {
   auto pieces = [this, slot = std::move(slot),
                  writer = FeatureWriter(asked.server, asked.target, asked.now_ns),
                  self = asked.self, sees = asked.sees, query, walk = HazardWalk(asked.sees),
-                 counts = std::make_shared<StreetCounts>(*zone_.streets()), is_counted = false,
-                 after = query.cursor](std::string& piece) mutable {
+                 counts = std::make_shared<StreetCounts>(*source_.zone.streets()),
+                 is_counted = false, after = query.cursor](std::string& piece) mutable {
     if (!is_counted) {
-      const auto page = zone_.ReadHazards(walk, kFeaturesPerRead);
+      const auto page = source_.zone.ReadHazards(walk, kFeaturesPerRead);
       for (const zone::Hazard& hazard : page.items) {
         if (MaySee(hazard, sees)) counts->Add(hazard);
       }
@@ -281,25 +281,25 @@ Json OgcApi::FindItem(const Asked& asked, const std::string& collection,
   if (collection == kHazards) return FindHazard(asked, id);
   if (collection == kStreets) return FindStreet(asked, id);
   const auto uuid = Uuid::Parse(id);
-  const auto change = uuid ? zone_.FindMapChange(*uuid) : std::nullopt;
+  const auto change = uuid ? source_.zone.FindMapChange(*uuid) : std::nullopt;
   return change && zone::IsOpen(change->state) ? MapChangeGeoJson(*change) : Json(nullptr);
 }
 
 Json OgcApi::FindHazard(const Asked& asked, const std::string& id) const {
   const auto uuid = Uuid::Parse(id);
-  const auto hazard = uuid ? zone_.Find(*uuid) : std::nullopt;
+  const auto hazard = uuid ? source_.zone.Find(*uuid) : std::nullopt;
   if (!hazard || !zone::IsOnMap(hazard->state) || !MaySee(*hazard, asked.sees)) return nullptr;
-  return HazardFeature(*hazard, catalogue_, zone_.WordsOf(*hazard));
+  return HazardFeature(*hazard, source_.catalogue, source_.zone.WordsOf(*hazard));
 }
 
 Json OgcApi::FindStreet(const Asked& asked, const std::string& id) const {
   const auto way = WholeNumber(id);
-  StreetCounts counts(*zone_.streets());
+  StreetCounts counts(*source_.zone.streets());
   auto walk = HazardWalk(asked.sees);
   if (way) walk.box = counts.ReachOf(*way);
   if (!walk.box) return nullptr;
   for (bool is_last = false; !is_last;) {
-    const auto page = zone_.ReadHazards(walk, kFeaturesPerRead);
+    const auto page = source_.zone.ReadHazards(walk, kFeaturesPerRead);
     for (const zone::Hazard& hazard : page.items) {
       if (MaySee(hazard, asked.sees)) counts.Add(hazard);
     }

@@ -1,21 +1,17 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "common/clock.h"
-#include "protocol/hazard_catalogue.h"
 #include "web/feeds/change_tags.h"
+#include "web/feeds/feed_source.h"
 #include "web/feeds/gathering_slots.h"
 #include "web/http/http_message.h"
 #include "web/http/request_target.h"
 #include "web/http/site.h"
-#include "web/http/web_config.h"
 #include "web/ogc/ogc_document.h"
 #include "web/ogc/ogc_query.h"
-#include "zone/service/zone_service.h"
 
 namespace livemap::web {
 
@@ -27,11 +23,7 @@ constexpr const char* kOgcAddress = "/ogc";
 /// of it. Thread-safe; store failures and bad requests come out as exceptions.
 class OgcApi {
  public:
-  using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
-
-  /// Keeps the references.
-  OgcApi(const WebConfig& options, zone::ZoneService& zone,
-         const protocol::HazardCatalogue& catalogue, Clock now_ns = SystemNs);
+  explicit OgcApi(FeedSource source);
 
   /// `target.path` starts with kOgcAddress. A bad request is answered as the standard says, 400
   /// with `{"code", "description"}`.
@@ -66,10 +58,7 @@ class OgcApi {
   zone::Walk<zone::HazardState> HazardWalk(const Visibility& sees) const;
   bool MaySee(const zone::Hazard& hazard, const Visibility& sees) const;
 
-  const WebConfig& options_;
-  zone::ZoneService& zone_;
-  const protocol::HazardCatalogue& catalogue_;
-  const Clock now_ns_;
+  const FeedSource source_;
   const ChangeTags tags_;
   mutable GatheringSlots slots_;
 };

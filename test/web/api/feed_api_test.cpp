@@ -48,7 +48,7 @@ class FeedApiTest : public testing::Test {
 
   ZoneFixture fixture_;
   WebConfig options_ = TestOptions();
-  FeedApi feeds_{options_, *fixture_.zone, fixture_.catalogue, [this] { return now_ns_; }};
+  FeedApi feeds_{{options_, *fixture_.zone, fixture_.catalogue, [this] { return now_ns_; }}};
   std::int64_t now_ns_ = ZoneFixture::kStartNs;
 };
 

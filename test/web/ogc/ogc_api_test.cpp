@@ -58,7 +58,7 @@ class OgcApiTest : public testing::Test {
 
   ZoneFixture fixture_{OgcTown()};
   WebConfig options_ = TestOptions();
-  OgcApi api_{options_, *fixture_.zone, fixture_.catalogue, [] { return ZoneFixture::kStartNs; }};
+  OgcApi api_{{options_, *fixture_.zone, fixture_.catalogue, [] { return ZoneFixture::kStartNs; }}};
 };
 
 TEST_F(OgcApiTest, TheLandingPageLeadsEverywhere) {
