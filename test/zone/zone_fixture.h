@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <random>
@@ -12,6 +13,8 @@
 
 #include "protocol/map_change_report.h"
 #include "protocol/report.h"
+#include "test/zone/postgresql_server.h"
+#include "test/zone/store_probe.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::zone {
@@ -28,18 +31,51 @@ constexpr char kLastReportsTable[] =
     "latitude DOUBLE PRECISION NOT NULL, longitude DOUBLE PRECISION NOT NULL, "
     "sigma_m DOUBLE PRECISION NOT NULL);";
 
-/// A directory of its own for each test, removed afterwards.
+/// Whether the tests of this process keep their stores in PostgreSQL: LIVEMAP_TEST_STORE, which
+/// ctest sets to "postgresql" for a second run of the same tests.
+inline bool IsOnPostgresql() {
+  const char* store = std::getenv("LIVEMAP_TEST_STORE");
+  return store != nullptr && std::string(store) == "postgresql";
+}
+
+/// The server of this process.
+inline test::PostgresqlServer& TestServer() {
+  static test::PostgresqlServer server;
+  return server;
+}
+
+/// A directory, and a database where that is not a file in it, of its own for each test, removed
+/// afterwards.
 class ZoneTest : public testing::Test {
  protected:
   ZoneTest() {
     std::string pattern = (std::filesystem::temp_directory_path() / "livemap_zone_XXXXXX").string();
     directory_ = mkdtemp(pattern.data());
+    if (IsOnPostgresql() && test::PostgresqlServer::IsInstalled()) {
+      store_url_ = TestServer().MakeDatabase();
+    }
   }
-  ~ZoneTest() override { std::filesystem::remove_all(directory_); }
+  ~ZoneTest() override {
+    std::filesystem::remove_all(directory_);
+    if (!store_url_.empty()) TestServer().DropDatabase(store_url_);
+  }
+  void SetUp() override {
+    if (IsOnPostgresql() && store_url_.empty()) {
+      GTEST_SKIP() << "skipped, no PostgreSQL server installed";
+    }
+  }
+  /// A store without a row.
+  void EmptyStore() {
+    std::filesystem::remove_all(directory_ + "/zone");
+    if (store_url_.empty()) return;
+    TestServer().DropDatabase(store_url_);
+    store_url_ = TestServer().MakeDatabase();
+  }
 
   ZoneService::Config Config() const {
     ZoneService::Config config;
     config.directory = directory_ + "/zone";
+    config.store_url = store_url_;
     // Reports of one vehicle lie all over the Earth.
     config.speed.max_speed_mps = 1e9;
     config.catalogue = OneVehicleSuffices();
@@ -49,14 +85,23 @@ class ZoneTest : public testing::Test {
   static protocol::HazardCatalogue OneVehicleSuffices() {
     return protocol::HazardCatalogue::Parse("defaults: {confirmations: 1}\nclasses: {}\n", "test");
   }
+  /// Of SQLite.
   std::string DatabasePath() const { return directory_ + "/zone/zone.sqlite3"; }
+  /// As ZoneStore takes it.
+  std::string Database() const { return store_url_.empty() ? DatabasePath() : store_url_; }
+  StoreProbe Probe() const { return StoreProbe(Database()); }
   /// A clock that stands still.
   static ZoneService::Clock Clock() {
     return [] { return kNowNs; };
   }
 
   std::string directory_;
+  std::string store_url_;  ///< Empty: SQLite.
 };
+
+/// For tests of SQLite's files, and of stores that were written before there was PostgreSQL.
+#define SKIP_ON_POSTGRESQL() \
+  if (IsOnPostgresql()) GTEST_SKIP() << "not of PostgreSQL"
 
 /// An acceptable report of a pothole, without a picture, with a uuid of its own.
 inline protocol::Report MakeReport(const geo::GeoPoint& position = {40.44, -79.94}) {

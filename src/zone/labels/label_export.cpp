@@ -11,10 +11,11 @@
 #include <vector>
 
 #include "common/error.h"
-#include "common/sqlite.h"
 #include "common/text_file.h"
 #include "common/utc_text.h"
 #include "zone/model/decision.h"
+#include "zone/store/queries.h"
+#include "zone/store/store_connection.h"
 
 namespace livemap::zone {
 namespace {
@@ -61,56 +62,76 @@ bool IsSha256(const std::string& text) {
   return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-void RequireSchemaWithBoxes(SqliteDatabase& database, const std::string& path) {
-  SqliteStatement find = database.Prepare("SELECT coalesce(max(version), 0) FROM livemap_schema");
-  const std::int64_t version = find.Step() ? find.Int(0) : 0;
+void RequireSchemaWithBoxes(soci::session& session, const std::string& store) {
+  int version = 0;
+  session << "SELECT coalesce(max(version), 0) FROM livemap_schema", soci::into(version);
   if (version >= kSchemaWithBoxes) return;
-  throw Error("store '" + path + "' has schema version " + std::to_string(version) +
+  throw Error("store '" + store + "' has schema version " + std::to_string(version) +
               ", accepted are " + std::to_string(kSchemaWithBoxes) +
               " and later: start the zone once, which brings it up to date");
 }
 
 /// The newest confirmation or rejection that stands, by the hazard's uuid.
-std::map<std::string, LabelVerdict> ReadVerdicts(SqliteDatabase& database) {
+std::map<std::string, LabelVerdict> ReadVerdicts(StoreConnection& connection) {
+  const int confirm = static_cast<int>(DecisionKind::kConfirmHazard);
+  const int reject = static_cast<int>(DecisionKind::kRejectHazard);
+  std::string subject, official;
+  int kind = 0;
+  long long at_ns = 0;
+  soci::statement find =
+      (connection.session().prepare
+           << "SELECT subject, kind, official, at_ns FROM decisions WHERE kind "
+              "IN (:c, :r) AND undone_by = 0 AND "
+           << connection.dialect().AreTexts({{"subject", 64}, {"official", 64}}) << " AND "
+           << connection.dialect().AreIntegers({"at_ns"}) << " ORDER BY id",
+       soci::use(confirm), soci::use(reject), soci::into(subject), soci::into(kind),
+       soci::into(official), soci::into(at_ns));
   std::map<std::string, LabelVerdict> verdicts;
-  SqliteStatement find = database.Prepare(
-      "SELECT subject, kind, official, at_ns FROM decisions WHERE kind IN (?, ?) AND undone_by = 0 "
-      "ORDER BY id");
-  const auto confirm = static_cast<std::int64_t>(DecisionKind::kConfirmHazard);
-  find.Bind(1, confirm).Bind(2, static_cast<std::int64_t>(DecisionKind::kRejectHazard));
-  while (find.Step()) {
-    verdicts[find.Text(0)] = {find.Int(1) == confirm, find.Text(2), find.Int(3)};
+  for (connection.Run(find); find.fetch();) {
+    verdicts[subject] = {kind == confirm, official, at_ns};
   }
   return verdicts;
 }
 
-HazardsById ReadHazards(SqliteDatabase& database,
+HazardsById ReadHazards(StoreConnection& connection,
                         const std::map<std::string, LabelVerdict>& verdicts) {
+  std::string uuid, class_name;
+  long long id = 0;
+  soci::statement find = (connection.session().prepare
+                              << "SELECT id, uuid, class_name FROM hazards WHERE "
+                              << connection.dialect().AreTexts({{"uuid", 36}, {"class_name", 64}}),
+                          soci::into(id), soci::into(uuid), soci::into(class_name));
   HazardsById hazards;
-  SqliteStatement find = database.Prepare("SELECT id, uuid, class_name FROM hazards");
-  while (find.Step()) {
-    KnownHazard hazard{find.Text(1), find.Text(2), nullptr};
+  for (connection.Run(find); find.fetch();) {
+    KnownHazard hazard{uuid, class_name, nullptr};
     const auto verdict = verdicts.find(hazard.uuid);
     if (verdict != verdicts.end()) hazard.verdict = &verdict->second;
-    hazards.emplace(find.Int(0), std::move(hazard));
+    hazards.emplace(id, std::move(hazard));
   }
   return hazards;
 }
 
-BoxesByPicture ReadBoxes(SqliteDatabase& database, const HazardsById& hazards) {
+BoxesByPicture ReadBoxes(StoreConnection& connection, const HazardsById& hazards) {
+  std::string picture;
+  long long id = 0;
+  double left = 0, top = 0, right = 0, bottom = 0;
+  soci::statement find =
+      (connection.session().prepare
+           << "SELECT hazard_id, image_sha256, box_left, box_top, box_right, box_bottom FROM "
+              "report_boxes WHERE "
+           << connection.dialect().AreIntegers({"hazard_id"}) << " AND "
+           << connection.dialect().AreTexts({{"image_sha256", 64}}) << " AND "
+           << connection.dialect().AreNumbers({"box_left", "box_top", "box_right", "box_bottom"}),
+       soci::into(id), soci::into(picture), soci::into(left), soci::into(top), soci::into(right),
+       soci::into(bottom));
   BoxesByPicture boxes;
-  SqliteStatement find = database.Prepare(
-      "SELECT hazard_id, image_sha256, box_left, box_top, box_right, box_bottom FROM report_boxes");
-  while (find.Step()) {
-    const auto hazard = hazards.find(find.Int(0));
-    const std::string picture = find.Text(1);
-    const LabelBox box{{find.Real(2), find.Real(3), find.Real(4), find.Real(5)},
-                       hazard == hazards.end() ? nullptr : &hazard->second};
-    const auto& [left, top, right, bottom] = box.edges;
+  for (connection.Run(find); find.fetch();) {
+    const auto hazard = hazards.find(id);
     // Written so that a row that this program did not write is none, NaN included.
     const bool is_box =
         left >= 0 && top >= 0 && right <= 1 && bottom <= 1 && left < right && top < bottom;
-    if (is_box && box.hazard != nullptr && IsSha256(picture)) boxes[picture].insert(box);
+    if (!is_box || hazard == hazards.end() || !IsSha256(picture)) continue;
+    boxes[picture].insert({{left, top, right, bottom}, &hazard->second});
   }
   return boxes;
 }
@@ -240,26 +261,29 @@ LabelExport CountLeftOut(const HazardsById& hazards, const BoxesByPicture& boxes
 
 }  // namespace
 
-LabelExport ExportLabels(const std::string& directory, const std::string& out) {
-  const std::string path = directory + "/zone.sqlite3";
-  if (!fs::is_regular_file(path)) {
-    throw Error("there is no store '" + path + "', accepted is the folder of a zone's store");
+LabelExport ExportLabels(const std::string& directory, const std::string& out,
+                         const std::string& store_url) {
+  const std::string store = store_url.empty() ? directory + "/zone.sqlite3" : store_url;
+  if (store_url.empty() && !fs::is_regular_file(store)) {
+    throw Error("there is no store '" + store + "', accepted is the folder of a zone's store");
   }
   if (fs::exists(out) && (!fs::is_directory(out) || !fs::is_empty(out))) {
     throw Error("'" + out + "' is there already, accepted is a new or an empty folder");
   }
-  SqliteDatabase database(path, true);
-  database.Execute("PRAGMA query_only=ON");
-  RequireSchemaWithBoxes(database, path);
   std::map<std::string, LabelVerdict> verdicts;
   HazardsById hazards;
   BoxesByPicture boxes;
-  // Of one moment, also while the zone goes on.
-  database.Execute("BEGIN");
-  verdicts = ReadVerdicts(database);
-  hazards = ReadHazards(database, verdicts);
-  boxes = ReadBoxes(database, hazards);
-  database.Execute("COMMIT");
+  ExplainStore("reading '" + store + "'", [&] {
+    StoreConnection connection(store, StoreConnection::Use::kRead);
+    soci::session& session = connection.session();
+    RequireSchemaWithBoxes(session, store);
+    // Of one moment, also while the zone goes on.
+    session << (connection.is_postgresql() ? "BEGIN ISOLATION LEVEL REPEATABLE READ" : "BEGIN");
+    verdicts = ReadVerdicts(connection);
+    hazards = ReadHazards(connection, verdicts);
+    boxes = ReadBoxes(connection, hazards);
+    session << "COMMIT";
+  });
   LabelExport done = CountLeftOut(hazards, boxes);
   std::vector<std::string> classes = ClassesOf(boxes);
   if (classes.empty()) {

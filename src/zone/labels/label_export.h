@@ -22,8 +22,10 @@ struct LabelExport {
 /// decided: they count as neither), classes.txt, labelled_classes.txt, and decisions.csv, which
 /// says who decided what of which picture, and when.
 ///
-/// `directory` is the zone's; the zone may be running. Throws Error when that holds no store, or
-/// `out` holds anything already, or there is nothing to write; StoreError when the store fails.
-LabelExport ExportLabels(const std::string& directory, const std::string& out);
+/// `directory` is the zone's, and so is `store_url` (ZoneConfig); the zone may be running. Throws
+/// Error when that holds no store, or `out` holds anything already, or there is nothing to write;
+/// StoreError when the store fails.
+LabelExport ExportLabels(const std::string& directory, const std::string& out,
+                         const std::string& store_url = "");
 
 }  // namespace livemap::zone

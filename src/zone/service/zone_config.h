@@ -24,6 +24,7 @@ namespace livemap::zone {
 /// Settings of a zone, with the rules of all its parts.
 struct ZoneConfig {
   std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
+  std::string store_url;              ///< Of PostgreSQL, in place of zone.sqlite3 (ZoneStore).
   double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
   double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
   std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.

@@ -11,16 +11,15 @@
 namespace livemap::zone {
 namespace {
 
-constexpr char kSoundDecision[] =
-    "typeof(kind) = 'integer' AND typeof(official) = 'text' AND "
-    "length(CAST(official AS BLOB)) <= 64 AND typeof(reason) = 'text' AND "
-    "length(CAST(reason AS BLOB)) <= 500 AND typeof(at_ns) = 'integer' AND "
-    "typeof(hazards) = 'integer' AND typeof(undone_by) = 'integer' AND typeof(before) = 'text' AND "
-    "length(CAST(before AS BLOB)) <= 5000 AND typeof(effects) = 'text' AND "
-    "length(CAST(effects AS BLOB)) <= 500";
-constexpr char kDetail[] =
-    "coalesce((SELECT substr(detail, 1, 200) FROM decision_details WHERE decision_id = "
-    "decisions.id AND typeof(detail) = 'text'), '')";
+std::string IsSoundDecision(const Dialect& dialect) {
+  return dialect.AreIntegers({"kind", "at_ns", "hazards", "undone_by"}) + " AND " +
+         dialect.AreTexts({{"official", 64}, {"reason", 500}, {"before", 5000}, {"effects", 500}});
+}
+std::string DetailOfDecision(const Dialect& dialect) {
+  return "coalesce((SELECT substr(detail, 1, 200) FROM decision_details WHERE decision_id = "
+         "decisions.id AND " +
+         dialect.AreTexts({{"detail", 100'000}}) + "), '')";
+}
 constexpr char kDecisionColumns[] =
     "SELECT id, kind, official, reason, at_ns, hazards, undone_by, before, effects, ";
 constexpr char kOfSubject[] = " FROM decisions WHERE subject = :s AND ";
@@ -28,12 +27,9 @@ constexpr char kOfSubject[] = " FROM decisions WHERE subject = :s AND ";
 /// and none of IsOfDesk.
 constexpr char kJudges[] = " AND kind NOT IN (5, 7, 8, 10, 11, 12)";
 /// As this program writes a uuid: one that no row may have could never be dropped by it.
-constexpr char kSoundWithdrawal[] =
-    "typeof(hazard_uuid) = 'text' AND length(CAST(hazard_uuid AS BLOB)) = 36 AND "
-    "hazard_uuid LIKE '________-____-____-____-____________' AND "
-    "replace(hazard_uuid, '-', '') NOT GLOB '*[^0-9a-f]*' AND "
-    "length(replace(hazard_uuid, '-', '')) = 32 AND "
-    "typeof(before) = 'text' AND length(CAST(before AS BLOB)) <= 500";
+std::string IsSoundWithdrawal(const Dialect& dialect) {
+  return dialect.IsUuid("hazard_uuid") + " AND " + dialect.AreTexts({{"before", 500}});
+}
 
 template <typename Row>
 bool IsSound(const Row& row) {
@@ -46,51 +42,58 @@ bool IsSound(const Row& row) {
 
 }  // namespace
 
-DecisionTable::DecisionTable(soci::session& session)
-    : session_(session),
-      find_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
-                             << " ORDER BY id DESC LIMIT :l",
+DecisionTable::DecisionTable(StoreConnection& connection)
+    : connection_(connection),
+      find_((connection.session().prepare
+                 << kDecisionColumns << DetailOfDecision(connection.dialect()) << kOfSubject
+                 << IsSoundDecision(connection.dialect()) << " ORDER BY id DESC LIMIT :l",
              soci::use(row_.subject), soci::use(row_.limit), soci::into(row_.id),
              soci::into(row_.kind), soci::into(row_.official), soci::into(row_.reason),
              soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
              soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail))),
-      find_newest_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
-                                    << kJudges << " AND id < :b ORDER BY id DESC LIMIT 1",
+      find_newest_((connection.session().prepare
+                        << kDecisionColumns << DetailOfDecision(connection.dialect()) << kOfSubject
+                        << IsSoundDecision(connection.dialect()) << kJudges
+                        << " AND id < :b ORDER BY id DESC LIMIT 1",
                     soci::use(row_.subject), soci::use(row_.below), soci::into(row_.id),
                     soci::into(row_.kind), soci::into(row_.official), soci::into(row_.reason),
                     soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
                     soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail))),
-      find_distrust_((session.prepare << kDecisionColumns << kDetail << kOfSubject << kSoundDecision
-                                      << " AND kind = :k AND undone_by = 0 AND id < :b "
-                                         "ORDER BY id DESC LIMIT 1",
+      find_distrust_((connection.session().prepare
+                          << kDecisionColumns << DetailOfDecision(connection.dialect())
+                          << kOfSubject << IsSoundDecision(connection.dialect())
+                          << " AND kind = :k AND undone_by = 0 AND id < :b "
+                             "ORDER BY id DESC LIMIT 1",
                       soci::use(row_.subject), soci::use(row_.wanted_kind), soci::use(row_.below),
                       soci::into(row_.id), soci::into(row_.kind), soci::into(row_.official),
                       soci::into(row_.reason), soci::into(row_.at_ns), soci::into(row_.hazards),
                       soci::into(row_.undone_by), soci::into(row_.before), soci::into(row_.effects),
                       soci::into(row_.detail))),
-      write_((session.prepare
-                  << "INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
-                     "undone_by, before, effects) VALUES (:k, :s, :o, :r, :a, :h, :u, :b, :e)",
-              soci::use(row_.kind), soci::use(row_.subject), soci::use(row_.official),
-              soci::use(row_.reason), soci::use(row_.at_ns), soci::use(row_.hazards),
-              soci::use(row_.undone_by), soci::use(row_.before), soci::use(row_.effects))),
-      undo_((session.prepare << "UPDATE decisions SET undone_by = :u WHERE id = :i",
-             soci::use(row_.undone_by), soci::use(row_.id))),
-      add_((session.prepare << "UPDATE decisions SET hazards = hazards + :h WHERE id = :i",
-            soci::use(row_.hazards), soci::use(row_.id))),
+      write_(connection,
+             "INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
+             "undone_by, before, effects) VALUES (:k, :s, :o, :r, :a, :h, :u, :b, :e)",
+             {row_.kind, row_.subject, row_.official, row_.reason, row_.at_ns, row_.hazards,
+              row_.undone_by, row_.before, row_.effects}),
+      undo_(connection, "UPDATE decisions SET undone_by = :u WHERE id = :i",
+            {row_.undone_by, row_.id}),
+      add_(connection, "UPDATE decisions SET hazards = hazards + :h WHERE id = :i",
+           {row_.hazards, row_.id}),
       find_withdrawals_(
-          (session.prepare << "SELECT hazard_uuid, before FROM withdrawals WHERE decision_id = :d "
-                              "AND "
-                           << kSoundWithdrawal << " ORDER BY hazard_uuid LIMIT :l",
+          (connection.session().prepare
+               << "SELECT hazard_uuid, before FROM withdrawals WHERE decision_id = :d "
+                  "AND "
+               << IsSoundWithdrawal(connection.dialect()) << " ORDER BY hazard_uuid LIMIT :l",
            soci::use(row_.id), soci::use(row_.limit), soci::into(row_.hazard_uuid),
            soci::into(row_.before))),
-      write_withdrawal_((session.prepare << "INSERT INTO withdrawals (decision_id, hazard_uuid, "
-                                            "before) VALUES (:d, :h, :b) ON CONFLICT "
-                                            "(decision_id, hazard_uuid) DO NOTHING",
-                         soci::use(row_.id), soci::use(row_.hazard_uuid), soci::use(row_.before))),
-      drop_withdrawal_((session.prepare << "DELETE FROM withdrawals WHERE decision_id = :d AND "
-                                           "hazard_uuid = :h",
-                        soci::use(row_.id), soci::use(row_.hazard_uuid))) {}
+      write_withdrawal_(connection,
+                        "INSERT INTO withdrawals (decision_id, hazard_uuid, "
+                        "before) VALUES (:d, :h, :b) ON CONFLICT "
+                        "(decision_id, hazard_uuid) DO NOTHING",
+                        {row_.id, row_.hazard_uuid, row_.before}),
+      drop_withdrawal_(connection,
+                       "DELETE FROM withdrawals WHERE decision_id = :d AND "
+                       "hazard_uuid = :h",
+                       {row_.id, row_.hazard_uuid}) {}
 
 DecisionRecord DecisionTable::ToDecision() const {
   DecisionRecord decision;
@@ -114,7 +117,7 @@ std::vector<DecisionRecord> DecisionTable::LoadDecisions(const std::string& subj
     std::vector<DecisionRecord> decisions;
     row_.subject = subject;
     row_.limit = static_cast<long long>(limit);
-    find_.execute();
+    connection_.Run(find_);
     while (find_.fetch()) {
       if (IsSound(row_)) decisions.push_back(ToDecision());
     }
@@ -139,21 +142,28 @@ std::vector<DecisionRecord> DecisionTable::LoadRange(const char* which, std::uin
     std::vector<DecisionRecord> decisions;
     row_.below = static_cast<long long>(std::min<std::uint64_t>(id, kMaxSequence));
     soci::statement find =
-        (session_.prepare << "SELECT id, kind, subject, official, reason, at_ns, hazards, "
-                             "undone_by, before, effects, "
-                          << kDetail
-                          << " FROM decisions WHERE typeof(subject) = 'text' AND "
-                             "length(CAST(subject AS BLOB)) <= 64 AND "
-                          << kSoundDecision << " AND " << which,
-         soci::use(row_.below), soci::into(row_.id), soci::into(row_.kind),
+        (connection_.session().prepare
+             << "SELECT id, kind, subject, official, reason, at_ns, hazards, "
+                "undone_by, before, effects, "
+             << DetailOfDecision(connection_.dialect()) << " FROM decisions WHERE "
+             << connection_.dialect().AreTexts({{"subject", 64}}) << " AND "
+             << IsSoundDecision(connection_.dialect()) << " AND " << which << " LIMIT :l",
+         soci::use(row_.below), soci::use(row_.limit), soci::into(row_.id), soci::into(row_.kind),
          soci::into(row_.subject), soci::into(row_.official), soci::into(row_.reason),
          soci::into(row_.at_ns), soci::into(row_.hazards), soci::into(row_.undone_by),
          soci::into(row_.before), soci::into(row_.effects), soci::into(row_.detail));
-    find.execute();
-    while (decisions.size() < limit && find.fetch()) {
-      if (IsSound(row_) && protocol::IsPrintableText(row_.subject, kMaxStoredTextBytes)) {
-        decisions.push_back(ToDecision());
+    // Broken rows make a page shorter than it was asked to be: another one follows.
+    for (bool is_end = false; !is_end && decisions.size() < limit;) {
+      row_.limit = static_cast<long long>(limit - decisions.size());
+      long long rows = 0;
+      connection_.Run(find);
+      for (; find.fetch(); ++rows) {
+        row_.below = row_.id;
+        if (IsSound(row_) && protocol::IsPrintableText(row_.subject, kMaxStoredTextBytes)) {
+          decisions.push_back(ToDecision());
+        }
       }
+      is_end = rows < row_.limit;
     }
     return decisions;
   });
@@ -166,7 +176,7 @@ std::optional<DecisionRecord> DecisionTable::FindBelow(soci::statement& find,
   return ExplainStore("reading decisions", [&]() -> std::optional<DecisionRecord> {
     row_.subject = subject;
     row_.below = static_cast<long long>(std::min<std::uint64_t>(before, kMaxSequence));
-    while (FetchOne(find)) {
+    while (FetchOne(connection_, find)) {
       if (IsSound(row_)) return ToDecision();
       row_.below = row_.id;
     }
@@ -195,11 +205,11 @@ std::uint64_t DecisionTable::WriteDecision(const DecisionRecord& decision) {
     row_.undone_by = static_cast<long long>(decision.undone_by);
     row_.before = decision.before;
     row_.effects = decision.effects;
-    write_.execute(true);
+    write_.Execute();
     long long id = 0;
-    session_ << "SELECT max(id) FROM decisions", soci::into(id);
+    connection_.session() << "SELECT max(id) FROM decisions", soci::into(id);
     if (!decision.detail.empty()) {
-      session_ << "INSERT INTO decision_details (decision_id, detail) VALUES (:i, :d)",
+      connection_.session() << "INSERT INTO decision_details (decision_id, detail) VALUES (:i, :d)",
           soci::use(id), soci::use(decision.detail);
     }
     return static_cast<std::uint64_t>(std::max(id, 0LL));
@@ -210,7 +220,7 @@ void DecisionTable::MarkUndone(std::uint64_t decision, std::uint64_t undone_by) 
   ExplainStore("marking a decision as undone", [&] {
     row_.id = static_cast<long long>(decision);
     row_.undone_by = static_cast<long long>(undone_by);
-    undo_.execute(true);
+    undo_.Execute();
   });
 }
 
@@ -218,7 +228,7 @@ void DecisionTable::AddHazards(std::uint64_t decision, std::uint64_t hazards) {
   ExplainStore("counting what a decision changed", [&] {
     row_.id = static_cast<long long>(decision);
     row_.hazards = static_cast<long long>(hazards);
-    add_.execute(true);
+    add_.Execute();
   });
 }
 
@@ -227,7 +237,7 @@ std::vector<Withdrawal> DecisionTable::LoadWithdrawals(std::uint64_t decision, s
     std::vector<Withdrawal> withdrawals;
     row_.id = static_cast<long long>(decision);
     row_.limit = static_cast<long long>(limit);
-    find_withdrawals_.execute();
+    connection_.Run(find_withdrawals_);
     while (find_withdrawals_.fetch()) {
       const auto hazard = Uuid::Parse(row_.hazard_uuid);
       if (hazard) withdrawals.push_back({*hazard, row_.before});
@@ -240,7 +250,8 @@ StoreDamage DecisionTable::CheckWithdrawals() {
   return ExplainStore("reading what was withdrawn", [&] {
     StoreDamage damage;
     long long broken = 0;
-    session_ << "SELECT count(*) FROM withdrawals WHERE NOT (" << kSoundWithdrawal << ")",
+    connection_.session() << "SELECT count(*) FROM withdrawals WHERE NOT ("
+                          << IsSoundWithdrawal(connection_.dialect()) << ")",
         soci::into(broken);
     for (; broken > 0; --broken) damage.Note("a row of withdrawals has no uuid or no lifecycle");
     return damage;
@@ -252,7 +263,7 @@ void DecisionTable::WriteWithdrawal(std::uint64_t decision, const Withdrawal& wi
     row_.id = static_cast<long long>(decision);
     row_.hazard_uuid = withdrawal.hazard.ToString();
     row_.before = withdrawal.before;
-    write_withdrawal_.execute(true);
+    write_withdrawal_.Execute();
   });
 }
 
@@ -260,7 +271,7 @@ void DecisionTable::DropWithdrawal(std::uint64_t decision, const Uuid& hazard) {
   ExplainStore("dropping what was withdrawn", [&] {
     row_.id = static_cast<long long>(decision);
     row_.hazard_uuid = hazard.ToString();
-    drop_withdrawal_.execute(true);
+    drop_withdrawal_.Execute();
   });
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -15,8 +16,8 @@ namespace livemap::zone {
 /// The tables `decisions` and `withdrawals`: what officials decided, and what was before.
 class DecisionTable {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit DecisionTable(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit DecisionTable(StoreConnection& connection);
   DecisionTable(const DecisionTable&) = delete;
   DecisionTable& operator=(const DecisionTable&) = delete;
 
@@ -48,17 +49,17 @@ class DecisionTable {
   std::optional<DecisionRecord> FindBelow(soci::statement& find, const std::string& subject,
                                           std::uint64_t before);
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
   soci::statement find_;
   soci::statement find_newest_;
   soci::statement find_distrust_;
-  soci::statement write_;
-  soci::statement undo_;
-  soci::statement add_;
+  WriteStatement write_;
+  WriteStatement undo_;
+  WriteStatement add_;
   soci::statement find_withdrawals_;
-  soci::statement write_withdrawal_;
-  soci::statement drop_withdrawal_;
+  WriteStatement write_withdrawal_;
+  WriteStatement drop_withdrawal_;
 };
 
 }  // namespace livemap::zone

@@ -12,20 +12,19 @@
 namespace livemap::zone {
 namespace {
 
-constexpr char kSoundRedirect[] =
-    "typeof(kind) = 'integer' AND typeof(class_name) = 'text' AND "
-    "length(CAST(class_name AS BLOB)) <= 64 AND typeof(latitude) = 'real' AND "
-    "typeof(longitude) = 'real' AND typeof(from_uuid) = 'text' AND "
-    "length(CAST(from_uuid AS BLOB)) = 36 AND typeof(hazard_uuid) = 'text' AND "
-    "length(CAST(hazard_uuid AS BLOB)) = 36";
-constexpr char kSoundAssignment[] =
-    "typeof(hazard_uuid) = 'text' AND length(CAST(hazard_uuid AS BLOB)) = 36 AND "
-    "typeof(team) = 'text' AND length(CAST(team AS BLOB)) <= 64 AND typeof(due_ns) = 'integer' AND "
-    "typeof(since_ns) = 'integer' AND typeof(decision_id) = 'integer'";
-constexpr char kSoundSighting[] =
-    "typeof(stamp_ns) = 'integer' AND typeof(confidence) = 'real' AND typeof(latitude) = 'real' "
-    "AND typeof(longitude) = 'real' AND typeof(image_sha256) = 'text' AND "
-    "length(CAST(image_sha256 AS BLOB)) <= 64";
+std::string IsSoundRedirect(const Dialect& dialect) {
+  return dialect.AreIntegers({"kind"}) + " AND " + dialect.AreNumbers({"latitude", "longitude"}) +
+         " AND " + dialect.AreTexts({{"class_name", 64}, {"from_uuid", 36}, {"hazard_uuid", 36}});
+}
+std::string IsSoundAssignment(const Dialect& dialect) {
+  return dialect.AreTexts({{"hazard_uuid", 36}, {"team", 64}}) + " AND " +
+         dialect.AreIntegers({"due_ns", "since_ns", "decision_id"});
+}
+std::string IsSoundSighting(const Dialect& dialect) {
+  return dialect.AreIntegers({"stamp_ns"}) + " AND " +
+         dialect.AreNumbers({"confidence", "latitude", "longitude"}) + " AND " +
+         dialect.AreTexts({{"image_sha256", 64}});
+}
 
 bool IsOfEdit(int kind) {
   return kind == static_cast<int>(DecisionKind::kReclassHazard) ||
@@ -44,13 +43,14 @@ StoreDamage DeskTable::LoadRedirects(const std::function<void(Redirect)>& take) 
     int kind = 0;
     Redirect redirect;
     soci::statement find =
-        (session_.prepare << "SELECT decision_id, kind, class_name, latitude, longitude, "
-                             "from_uuid, hazard_uuid FROM redirects WHERE "
-                          << kSoundRedirect << " ORDER BY decision_id",
+        (connection_.session().prepare
+             << "SELECT decision_id, kind, class_name, latitude, longitude, "
+                "from_uuid, hazard_uuid FROM redirects WHERE "
+             << IsSoundRedirect(connection_.dialect()) << " ORDER BY decision_id",
          soci::into(id), soci::into(kind), soci::into(class_name),
          soci::into(redirect.position.latitude_deg), soci::into(redirect.position.longitude_deg),
          soci::into(from), soci::into(hazard));
-    return LoadRows(session_, "redirects", find, [&] {
+    return LoadRows(connection_, "redirects", find, [&] {
       const auto from_uuid = Uuid::Parse(from);
       const auto hazard_uuid = Uuid::Parse(hazard);
       const bool is_sound = IsDecisionId(id) && IsOfEdit(kind) && from_uuid && hazard_uuid &&
@@ -72,8 +72,9 @@ void DeskTable::WriteRedirect(const Redirect& redirect) {
     const int kind = static_cast<int>(redirect.kind);
     const std::string from = redirect.from.ToString();
     const std::string hazard = redirect.hazard.ToString();
-    session_ << "INSERT INTO redirects (decision_id, kind, class_name, latitude, longitude, "
-                "from_uuid, hazard_uuid) VALUES (:i, :k, :c, :la, :lo, :f, :h)",
+    connection_.session()
+        << "INSERT INTO redirects (decision_id, kind, class_name, latitude, longitude, "
+           "from_uuid, hazard_uuid) VALUES (:i, :k, :c, :la, :lo, :f, :h)",
         soci::use(id), soci::use(kind), soci::use(redirect.class_name),
         soci::use(redirect.position.latitude_deg), soci::use(redirect.position.longitude_deg),
         soci::use(from), soci::use(hazard);
@@ -83,7 +84,7 @@ void DeskTable::WriteRedirect(const Redirect& redirect) {
 void DeskTable::DropRedirect(std::uint64_t decision) {
   ExplainStore("dropping a redirect", [&] {
     const auto id = static_cast<long long>(decision);
-    session_ << "DELETE FROM redirects WHERE decision_id = :i", soci::use(id);
+    connection_.session() << "DELETE FROM redirects WHERE decision_id = :i", soci::use(id);
   });
 }
 
@@ -92,13 +93,14 @@ std::vector<Assignment> DeskTable::LoadAssignments() {
     std::vector<Assignment> assignments;
     std::string hazard, team;
     long long due_ns = 0, since_ns = 0, decision = 0;
-    soci::statement find =
-        (session_.prepare << "SELECT hazard_uuid, team, due_ns, since_ns, decision_id FROM "
-                             "assignments WHERE "
-                          << kSoundAssignment << " ORDER BY due_ns = 0, due_ns, decision_id",
-         soci::into(hazard), soci::into(team), soci::into(due_ns), soci::into(since_ns),
-         soci::into(decision));
-    find.execute();
+    soci::statement find = (connection_.session().prepare
+                                << "SELECT hazard_uuid, team, due_ns, since_ns, decision_id FROM "
+                                   "assignments WHERE "
+                                << IsSoundAssignment(connection_.dialect())
+                                << " ORDER BY due_ns = 0, due_ns, decision_id",
+                            soci::into(hazard), soci::into(team), soci::into(due_ns),
+                            soci::into(since_ns), soci::into(decision));
+    connection_.Run(find);
     while (find.fetch()) {
       const auto uuid = Uuid::Parse(hazard);
       const bool is_sound = uuid && protocol::IsPrintableText(team, kMaxTeamBytes) &&
@@ -116,10 +118,11 @@ void DeskTable::WriteAssignment(const Assignment& assignment) {
     const long long due_ns = assignment.due_ns;
     const long long since_ns = assignment.since_ns;
     const auto decision = static_cast<long long>(assignment.decision);
-    session_ << "INSERT INTO assignments (hazard_uuid, team, due_ns, since_ns, decision_id) "
-                "VALUES (:h, :t, :d, :s, :i) ON CONFLICT (hazard_uuid) DO UPDATE SET "
-                "team = excluded.team, due_ns = excluded.due_ns, since_ns = excluded.since_ns, "
-                "decision_id = excluded.decision_id",
+    connection_.session()
+        << "INSERT INTO assignments (hazard_uuid, team, due_ns, since_ns, decision_id) "
+           "VALUES (:h, :t, :d, :s, :i) ON CONFLICT (hazard_uuid) DO UPDATE SET "
+           "team = excluded.team, due_ns = excluded.due_ns, since_ns = excluded.since_ns, "
+           "decision_id = excluded.decision_id",
         soci::use(hazard), soci::use(assignment.team), soci::use(due_ns), soci::use(since_ns),
         soci::use(decision);
   });
@@ -128,7 +131,7 @@ void DeskTable::WriteAssignment(const Assignment& assignment) {
 void DeskTable::DropAssignment(const Uuid& hazard) {
   ExplainStore("dropping an assignment", [&] {
     const std::string uuid = hazard.ToString();
-    session_ << "DELETE FROM assignments WHERE hazard_uuid = :h", soci::use(uuid);
+    connection_.session() << "DELETE FROM assignments WHERE hazard_uuid = :h", soci::use(uuid);
   });
 }
 
@@ -143,13 +146,14 @@ std::vector<SightingRecord> DeskTable::LoadSightings(std::uint64_t hazard_id, co
     sighting.hazard = hazard;
     // The newest first: the search ends when as many are found as there are.
     soci::statement find =
-        (session_.prepare << "SELECT stamp_ns, confidence, latitude, longitude, image_sha256 FROM "
-                             "reports WHERE hazard_id = :h AND "
-                          << kSoundSighting << " ORDER BY rowid DESC LIMIT :l",
+        (connection_.session().prepare
+             << "SELECT stamp_ns, confidence, latitude, longitude, image_sha256 FROM "
+                "reports WHERE hazard_id = :h AND "
+             << IsSoundSighting(connection_.dialect()) << " ORDER BY rowid DESC LIMIT :l",
          soci::use(id), soci::use(most), soci::into(stamp_ns), soci::into(sighting.confidence),
          soci::into(sighting.position.latitude_deg), soci::into(sighting.position.longitude_deg),
          soci::into(sighting.image_sha256));
-    find.execute();
+    connection_.Run(find);
     while (find.fetch()) {
       if (!IsStamp(stamp_ns) || !geo::IsValid(sighting.position)) continue;
       sighting.stamp_ns = stamp_ns;

@@ -12,6 +12,7 @@
 #include "zone/desk/desk_action.h"
 #include "zone/desk/redirects.h"
 #include "zone/model/store_damage.h"
+#include "zone/store/store_connection.h"
 
 namespace livemap::zone {
 
@@ -19,8 +20,8 @@ namespace livemap::zone {
 /// StoreError. Few rows change, one at a time, so that no statement is kept ready.
 class DeskTable {
  public:
-  /// Keeps the session.
-  explicit DeskTable(soci::session& session) : session_(session) {}
+  /// Keeps the connection.
+  explicit DeskTable(StoreConnection& connection) : connection_(connection) {}
 
   /// As ZoneStore's functions of these names.
   StoreDamage LoadRedirects(const std::function<void(Redirect)>& take);
@@ -33,7 +34,7 @@ class DeskTable {
                                             std::size_t limit);
 
  private:
-  soci::session& session_;
+  StoreConnection& connection_;
 };
 
 }  // namespace livemap::zone

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -15,8 +16,8 @@ namespace livemap::zone {
 /// The table `events`: the history of every hazard.
 class EventLog {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit EventLog(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit EventLog(StoreConnection& connection);
   EventLog(const EventLog&) = delete;
   EventLog& operator=(const EventLog&) = delete;
 
@@ -35,10 +36,10 @@ class EventLog {
     soci::indicator has_from = soci::i_ok;
   };
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
   soci::statement find_;
-  soci::statement write_;
+  WriteStatement write_;
 };
 
 }  // namespace livemap::zone

@@ -43,12 +43,12 @@ std::optional<Event> EventOf(const Row& row, std::size_t states) {
 /// `find` fetches the event `row.sequence` into `row`, of which `read` makes an event, or none for
 /// a broken row, which is left out.
 template <typename Row, typename Read>
-auto WalkEvents(std::uint64_t sequence, std::size_t limit, soci::statement& find, Row& row,
-                const Read& read) {
+auto WalkEvents(StoreConnection& connection, std::uint64_t sequence, std::size_t limit,
+                soci::statement& find, Row& row, const Read& read) {
   std::vector<typename decltype(read(row))::value_type> events;
   for (std::size_t looked_at = 0; sequence != 0 && looked_at < limit; ++looked_at) {
     row.sequence = static_cast<long long>(sequence);
-    if (!FetchOne(find)) break;
+    if (!FetchOne(connection, find)) break;
     if (auto event = read(row)) events.push_back(*std::move(event));
     // Downwards only, whatever stands in the file.
     const auto previous = static_cast<std::uint64_t>(std::max(row.previous_sequence, 0LL));

@@ -17,20 +17,19 @@ constexpr std::int16_t kReporterWeight1000 = 1000;  // A voice of which only a r
 
 constexpr double kFullTurnRad = 2 * M_PI;
 
-constexpr char kSoundHazard[] =
-    "typeof(uuid) = 'text' AND length(CAST(uuid AS BLOB)) = 36 AND "
-    "typeof(class_name) = 'text' AND length(CAST(class_name AS BLOB)) <= 64 AND "
-    "typeof(confidence) IN ('real', 'integer') AND typeof(latitude) IN ('real', 'integer') AND "
-    "typeof(longitude) IN ('real', 'integer') AND typeof(covariance_ee) IN ('real', 'integer') "
-    "AND typeof(covariance_en) IN ('real', 'integer') AND "
-    "typeof(covariance_nn) IN ('real', 'integer') AND typeof(presence) IN ('real', 'integer') AND "
-    "typeof(sightings) = 'integer' AND typeof(first_seen_ns) = 'integer' AND "
-    "typeof(last_seen_ns) = 'integer' AND typeof(updated_ns) = 'integer' AND "
-    "typeof(sequence) = 'integer' AND typeof(announced_sequence) = 'integer' AND "
-    "typeof(state) = 'integer' AND typeof(vehicles) = 'integer' AND "
-    "typeof(image_sha256) = 'text' AND length(CAST(image_sha256 AS BLOB)) <= 64 AND "
-    "typeof(image_format) = 'text' AND length(CAST(image_format AS BLOB)) <= 8 AND "
-    "typeof(life) = 'text' AND length(CAST(life AS BLOB)) <= 500";
+std::string IsSoundHazard(const Dialect& dialect) {
+  return dialect.AreTexts({{"uuid", 36},
+                           {"class_name", 64},
+                           {"image_sha256", 64},
+                           {"image_format", 8},
+                           {"life", 500}}) +
+         " AND " +
+         dialect.AreNumbers({"confidence", "latitude", "longitude", "covariance_ee",
+                             "covariance_en", "covariance_nn", "presence"}) +
+         " AND " +
+         dialect.AreIntegers({"sightings", "first_seen_ns", "last_seen_ns", "updated_ns",
+                              "sequence", "announced_sequence", "state", "vehicles"});
+}
 
 bool IsHazardShare(double value) { return value >= 0 && value <= 1; }
 
@@ -80,39 +79,51 @@ PresenceRecord HazardLifeOf(const Hazard& hazard) {
 
 }  // namespace
 
-HazardTable::HazardTable(soci::session& session)
-    : session_(session),
-      write_(
-          (session.prepare
-               << "INSERT INTO hazards (id, uuid, class_name, confidence, latitude, longitude, "
-                  "covariance_ee, covariance_en, covariance_nn, sightings, first_seen_ns, "
-                  "last_seen_ns, updated_ns, sequence, announced_sequence, image_sha256, "
-                  "image_format, state, presence, vehicles, life) VALUES (:i, :u, :c, :co, :la, "
-                  ":lo, "
-                  ":ee, :en, :nn, :si, :fi, :ls, :up, :se, :an, :is, :im, :st, :pr, :ve, :li) "
-                  "ON CONFLICT (id) DO UPDATE SET confidence = excluded.confidence, "
-                  "latitude = excluded.latitude, longitude = excluded.longitude, "
-                  "covariance_ee = excluded.covariance_ee, covariance_en = excluded.covariance_en, "
-                  "covariance_nn = excluded.covariance_nn, sightings = excluded.sightings, "
-                  "first_seen_ns = excluded.first_seen_ns, last_seen_ns = excluded.last_seen_ns, "
-                  "updated_ns = excluded.updated_ns, sequence = excluded.sequence, "
-                  "announced_sequence = excluded.announced_sequence, "
-                  "image_sha256 = excluded.image_sha256, image_format = excluded.image_format, "
-                  "state = excluded.state, presence = excluded.presence, "
-                  "vehicles = excluded.vehicles, life = excluded.life",
-           soci::use(row_.id), soci::use(row_.uuid), soci::use(row_.class_name),
-           soci::use(row_.confidence), soci::use(row_.latitude), soci::use(row_.longitude),
-           soci::use(row_.covariance_ee), soci::use(row_.covariance_en),
-           soci::use(row_.covariance_nn), soci::use(row_.sightings), soci::use(row_.first_seen_ns),
-           soci::use(row_.last_seen_ns), soci::use(row_.updated_ns), soci::use(row_.sequence),
-           soci::use(row_.announced_sequence), soci::use(row_.image_sha256),
-           soci::use(row_.image_format), soci::use(row_.state), soci::use(row_.presence),
-           soci::use(row_.vehicles), soci::use(row_.life))),
-      write_course_((session.prepare
-                         << "INSERT INTO hazard_courses (hazard_id, course_rad) VALUES (:i, :c) "
-                            "ON CONFLICT (hazard_id) DO UPDATE SET "
-                            "course_rad = excluded.course_rad",
-                     soci::use(row_.id), soci::use(row_.course_rad))) {}
+HazardTable::HazardTable(StoreConnection& connection)
+    : connection_(connection),
+      write_(connection,
+             "INSERT INTO hazards (id, uuid, class_name, confidence, latitude, longitude, "
+             "covariance_ee, covariance_en, covariance_nn, sightings, first_seen_ns, "
+             "last_seen_ns, updated_ns, sequence, announced_sequence, image_sha256, "
+             "image_format, state, presence, vehicles, life) VALUES (:i, :u, :c, :co, :la, "
+             ":lo, "
+             ":ee, :en, :nn, :si, :fi, :ls, :up, :se, :an, :is, :im, :st, :pr, :ve, :li) "
+             "ON CONFLICT (id) DO UPDATE SET confidence = excluded.confidence, "
+             "latitude = excluded.latitude, longitude = excluded.longitude, "
+             "covariance_ee = excluded.covariance_ee, covariance_en = excluded.covariance_en, "
+             "covariance_nn = excluded.covariance_nn, sightings = excluded.sightings, "
+             "first_seen_ns = excluded.first_seen_ns, last_seen_ns = excluded.last_seen_ns, "
+             "updated_ns = excluded.updated_ns, sequence = excluded.sequence, "
+             "announced_sequence = excluded.announced_sequence, "
+             "image_sha256 = excluded.image_sha256, image_format = excluded.image_format, "
+             "state = excluded.state, presence = excluded.presence, "
+             "vehicles = excluded.vehicles, life = excluded.life",
+             {row_.id,
+              row_.uuid,
+              row_.class_name,
+              row_.confidence,
+              row_.latitude,
+              row_.longitude,
+              row_.covariance_ee,
+              row_.covariance_en,
+              row_.covariance_nn,
+              row_.sightings,
+              row_.first_seen_ns,
+              row_.last_seen_ns,
+              row_.updated_ns,
+              row_.sequence,
+              row_.announced_sequence,
+              row_.image_sha256,
+              row_.image_format,
+              row_.state,
+              row_.presence,
+              row_.vehicles,
+              row_.life}),
+      write_course_(connection,
+                    "INSERT INTO hazard_courses (hazard_id, course_rad) VALUES (:i, :c) "
+                    "ON CONFLICT (hazard_id) DO UPDATE SET "
+                    "course_rad = excluded.course_rad",
+                    {row_.id, row_.course_rad}) {}
 
 ZoneStore::HazardRow HazardTable::ToHazard(const Row& row) {
   ZoneStore::HazardRow result;
@@ -149,18 +160,20 @@ std::map<long long, std::vector<VehicleEvidence>> HazardTable::VoicesOfReports()
   constexpr char kLifeless[] = "FROM hazards WHERE life = '' AND state IN (1, 2)";
   std::map<long long, std::vector<VehicleEvidence>> voices;
   long long lifeless = 0;
-  session_ << "SELECT count(*) " << kLifeless, soci::into(lifeless);
+  connection_.session() << "SELECT count(*) " << kLifeless, soci::into(lifeless);
   if (lifeless == 0) return voices;
   std::string vehicle_id;
   long long hazard_id = 0, stamp_ns = 0;
   soci::statement query =
-      (session_.prepare << "SELECT hazard_id, vehicle_id, max(stamp_ns) AS newest FROM reports "
-                           "WHERE typeof(hazard_id) = 'integer' AND typeof(stamp_ns) = 'integer' "
-                           "AND typeof(vehicle_id) = 'text' AND length(vehicle_id) <= 64 "
-                           "AND hazard_id IN (SELECT id "
-                        << kLifeless << ") GROUP BY hazard_id, vehicle_id ORDER BY newest DESC",
+      (connection_.session().prepare
+           << "SELECT hazard_id, vehicle_id, max(stamp_ns) AS newest FROM reports "
+              "WHERE "
+           << connection_.dialect().AreIntegers({"hazard_id", "stamp_ns"}) << " AND "
+           << connection_.dialect().AreTexts({{"vehicle_id", 64}})
+           << " AND hazard_id IN (SELECT id " << kLifeless
+           << ") GROUP BY hazard_id, vehicle_id ORDER BY newest DESC",
        soci::into(hazard_id), soci::into(vehicle_id), soci::into(stamp_ns));
-  query.execute();
+  connection_.Run(query);
   while (query.fetch()) {
     std::vector<VehicleEvidence>& of_hazard = voices[hazard_id];
     if (of_hazard.size() == kMaxEvidencePerHazard || !IsStamp(stamp_ns)) continue;
@@ -179,19 +192,19 @@ StoreDamage HazardTable::Load(const std::function<void(ZoneStore::HazardRow)>& t
     const auto voices = VoicesOfReports();
     Row row;
     soci::statement query =
-        (session_.prepare
+        (connection_.session().prepare
              << "SELECT id, uuid, class_name, confidence, latitude, longitude, covariance_ee, "
                 "covariance_en, covariance_nn, sightings, first_seen_ns, last_seen_ns, "
                 "updated_ns, sequence, announced_sequence, image_sha256, image_format, state, "
                 "presence, vehicles, life FROM hazards WHERE "
-             << kSoundHazard << " ORDER BY sequence, id",
+             << IsSoundHazard(connection_.dialect()) << " ORDER BY sequence, id",
          into(row.id), into(row.uuid), into(row.class_name), into(row.confidence),
          into(row.latitude), into(row.longitude), into(row.covariance_ee), into(row.covariance_en),
          into(row.covariance_nn), into(row.sightings), into(row.first_seen_ns),
          into(row.last_seen_ns), into(row.updated_ns), into(row.sequence),
          into(row.announced_sequence), into(row.image_sha256), into(row.image_format),
          into(row.state), into(row.presence), into(row.vehicles), into(row.life));
-    return LoadRows(session_, "hazards", query, [&] {
+    return LoadRows(connection_, "hazards", query, [&] {
       ZoneStore::HazardRow hazard = ToHazard(row);
       const auto of_hazard = voices.find(row.id);
       if (row.life.empty() && of_hazard != voices.end()) {
@@ -207,10 +220,10 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
     long long id = 0;
     double course_rad = 0;
     soci::statement query =
-        (session_.prepare << "SELECT hazard_id, course_rad FROM hazard_courses WHERE "
-                             "typeof(course_rad) IN ('real', 'integer')",
+        (connection_.session().prepare << "SELECT hazard_id, course_rad FROM hazard_courses WHERE "
+                                       << connection_.dialect().AreNumbers({"course_rad"}),
          soci::into(id), soci::into(course_rad));
-    return LoadRows(session_, "hazard_courses", query, [&] {
+    return LoadRows(connection_, "hazard_courses", query, [&] {
       const bool sound = id >= 1 && id <= kMaxRowId && std::abs(course_rad) <= kFullTurnRad;
       if (!sound) throw Error("hazard " + std::to_string(id) + " has a course that is none");
       take(static_cast<std::uint64_t>(id), course_rad);
@@ -221,8 +234,8 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
 void HazardTable::WriteClass(std::uint64_t hazard_id, const std::string& class_name) {
   ExplainStore("writing a hazard's class", [&] {
     const auto id = static_cast<long long>(hazard_id);
-    session_ << "UPDATE hazards SET class_name = :c WHERE id = :i", soci::use(class_name),
-        soci::use(id);
+    connection_.session() << "UPDATE hazards SET class_name = :c WHERE id = :i",
+        soci::use(class_name), soci::use(id);
   });
 }
 
@@ -230,15 +243,15 @@ void HazardTable::WriteCourse(std::uint64_t hazard_id, double course_rad) {
   ExplainStore("writing the course of a hazard", [&] {
     row_.id = static_cast<long long>(hazard_id);
     row_.course_rad = std::remainder(course_rad, kFullTurnRad);
-    write_course_.execute(true);
+    write_course_.Execute();
   });
 }
 
 std::uint64_t HazardTable::LastId() {
   return ExplainStore("reading the newest hazard", [&] {
     long long id = 0;
-    session_ << "SELECT coalesce(max(id), 0) FROM hazards WHERE id <= :most", soci::use(kMaxRowId),
-        soci::into(id);
+    connection_.session() << "SELECT coalesce(max(id), 0) FROM hazards WHERE id <= :most",
+        soci::use(kMaxRowId), soci::into(id);
     return static_cast<std::uint64_t>(std::max(id, 0LL));
   });
 }
@@ -267,7 +280,7 @@ void HazardTable::Write(const ZoneStore::HazardRow& written) {
     row_.presence = static_cast<double>(hazard.presence);
     row_.vehicles = static_cast<int>(hazard.vehicles);
     row_.life = PackPresence(written.life);
-    write_.execute(true);
+    write_.Execute();
   });
 }
 

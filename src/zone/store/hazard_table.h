@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -16,8 +17,8 @@ namespace livemap::zone {
 /// The table `hazards`: each hazard as it is now, with its presence record.
 class HazardTable {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit HazardTable(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit HazardTable(StoreConnection& connection);
   HazardTable(const HazardTable&) = delete;
   HazardTable& operator=(const HazardTable&) = delete;
 
@@ -44,10 +45,10 @@ class HazardTable {
   static ZoneStore::HazardRow ToHazard(const Row& row);
   std::map<long long, std::vector<VehicleEvidence>> VoicesOfReports();
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
-  soci::statement write_;
-  soci::statement write_course_;
+  WriteStatement write_;
+  WriteStatement write_course_;
 };
 
 }  // namespace livemap::zone

@@ -12,40 +12,41 @@ namespace {
 constexpr double kMaxEnded = 1e6;  // SurvivalModel's largest memory.
 constexpr double kMaxStoodS = 1e15;
 
-constexpr char kSoundLife[] =
-    "typeof(class_name) = 'text' AND length(CAST(class_name AS BLOB)) <= 64 AND "
-    "typeof(ended) IN ('real', 'integer') AND typeof(stood_s) IN ('real', 'integer')";
-constexpr char kSoundTrust[] =
-    "typeof(vehicle_key) = 'integer' AND typeof(suspicion) IN ('real', 'integer') AND "
-    "typeof(at_ns) = 'integer' AND typeof(vouchers) = 'text' AND "
-    "length(CAST(vouchers AS BLOB)) <= 200";
+std::string IsSoundLife(const Dialect& dialect) {
+  return dialect.AreTexts({{"class_name", 64}}) + " AND " +
+         dialect.AreNumbers({"ended", "stood_s"});
+}
+std::string IsSoundTrust(const Dialect& dialect) {
+  return dialect.AreIntegers({"vehicle_key", "at_ns"}) + " AND " +
+         dialect.AreNumbers({"suspicion"}) + " AND " + dialect.AreTexts({{"vouchers", 200}});
+}
 
 }  // namespace
 
-LearnedTables::LearnedTables(soci::session& session)
-    : session_(session),
-      write_life_((session.prepare
-                       << "INSERT INTO lives (class_name, ended, stood_s) VALUES (:c, :e, :s) "
-                          "ON CONFLICT (class_name) DO UPDATE SET ended = excluded.ended, "
-                          "stood_s = excluded.stood_s",
-                   soci::use(row_.class_name), soci::use(row_.ended), soci::use(row_.stood_s))),
+LearnedTables::LearnedTables(StoreConnection& connection)
+    : connection_(connection),
+      write_life_(connection,
+                  "INSERT INTO lives (class_name, ended, stood_s) VALUES (:c, :e, :s) "
+                  "ON CONFLICT (class_name) DO UPDATE SET ended = excluded.ended, "
+                  "stood_s = excluded.stood_s",
+                  {row_.class_name, row_.ended, row_.stood_s}),
       write_trust_(
-          (session.prepare
-               << "INSERT INTO trust (vehicle_key, suspicion, at_ns, vouchers) VALUES (:k, :s, :a, "
-                  ":v) "
-                  "ON CONFLICT (vehicle_key) DO UPDATE SET suspicion = excluded.suspicion, "
-                  "at_ns = excluded.at_ns, vouchers = excluded.vouchers",
-           soci::use(row_.vehicle_key), soci::use(row_.suspicion), soci::use(row_.updated_ns),
-           soci::use(row_.vouchers))) {}
+          connection,
+          "INSERT INTO trust (vehicle_key, suspicion, at_ns, vouchers) VALUES (:k, :s, :a, "
+          ":v) "
+          "ON CONFLICT (vehicle_key) DO UPDATE SET suspicion = excluded.suspicion, "
+          "at_ns = excluded.at_ns, vouchers = excluded.vouchers",
+          {row_.vehicle_key, row_.suspicion, row_.updated_ns, row_.vouchers}) {}
 
 StoreDamage LearnedTables::LoadLives(
     const std::function<void(const std::string&, LearnedLifetime)>& take) {
   return ExplainStore("loading what was learned of classes", [&] {
     Row row;
     soci::statement query =
-        (session_.prepare << "SELECT class_name, ended, stood_s FROM lives WHERE " << kSoundLife,
+        (connection_.session().prepare << "SELECT class_name, ended, stood_s FROM lives WHERE "
+                                       << IsSoundLife(connection_.dialect()),
          soci::into(row.class_name), soci::into(row.ended), soci::into(row.stood_s));
-    return LoadRows(session_, "lives", query, [&] {
+    return LoadRows(connection_, "lives", query, [&] {
       const bool sound = protocol::IsPrintableText(row.class_name, kMaxStoredTextBytes) &&
                          row.ended >= 0 && row.ended <= kMaxEnded && row.stood_s >= 0 &&
                          row.stood_s <= kMaxStoodS;
@@ -60,11 +61,12 @@ StoreDamage LearnedTables::LoadTrust(
   return ExplainStore("loading what is held against vehicles", [&] {
     Row row;
     soci::statement query =
-        (session_.prepare << "SELECT vehicle_key, suspicion, at_ns, vouchers FROM trust WHERE "
-                          << kSoundTrust,
+        (connection_.session().prepare
+             << "SELECT vehicle_key, suspicion, at_ns, vouchers FROM trust WHERE "
+             << IsSoundTrust(connection_.dialect()),
          soci::into(row.vehicle_key), soci::into(row.suspicion), soci::into(row.updated_ns),
          soci::into(row.vouchers));
-    return LoadRows(session_, "trust", query, [&] {
+    return LoadRows(connection_, "trust", query, [&] {
       TrustRecord record;
       record.suspicion = row.suspicion;
       record.at_ns = row.updated_ns;
@@ -81,7 +83,7 @@ void LearnedTables::WriteLife(const std::string& class_name, const LearnedLifeti
     row_.class_name = class_name;
     row_.ended = learned.ended;
     row_.stood_s = learned.stood_s;
-    write_life_.execute(true);
+    write_life_.Execute();
   });
 }
 
@@ -92,7 +94,7 @@ void LearnedTables::WriteTrust(std::uint64_t vehicle, const TrustRecord& record)
     row_.suspicion = record.suspicion;
     row_.updated_ns = record.at_ns;
     row_.vouchers = PackVouchers(record);
-    write_trust_.execute(true);
+    write_trust_.Execute();
   });
 }
 

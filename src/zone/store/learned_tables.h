@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -14,8 +15,8 @@ namespace livemap::zone {
 /// The tables `lives` and `trust`: what the zone has learned of classes and of vehicles.
 class LearnedTables {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit LearnedTables(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit LearnedTables(StoreConnection& connection);
   LearnedTables(const LearnedTables&) = delete;
   LearnedTables& operator=(const LearnedTables&) = delete;
 
@@ -33,10 +34,10 @@ class LearnedTables {
     long long vehicle_key = 0, updated_ns = 0;
   };
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
-  soci::statement write_life_;
-  soci::statement write_trust_;
+  WriteStatement write_life_;
+  WriteStatement write_trust_;
 };
 
 }  // namespace livemap::zone

@@ -13,22 +13,18 @@
 namespace livemap::zone {
 namespace {
 
-constexpr char kSoundMapChange[] =
-    "typeof(uuid) = 'text' AND length(CAST(uuid AS BLOB)) = 36 AND "
-    "typeof(class_name) = 'text' AND length(CAST(class_name AS BLOB)) <= 64 AND "
-    "typeof(vanished) = 'integer' AND typeof(state) = 'integer' AND "
-    "typeof(confidence) IN ('real', 'integer') AND typeof(latitude) IN ('real', 'integer') AND "
-    "typeof(longitude) IN ('real', 'integer') AND typeof(covariance_ee) IN ('real', 'integer') "
-    "AND typeof(covariance_en) IN ('real', 'integer') AND "
-    "typeof(covariance_nn) IN ('real', 'integer') AND typeof(reports) = 'integer' AND "
-    "typeof(drives) = 'integer' AND typeof(first_seen_ns) = 'integer' AND "
-    "typeof(last_seen_ns) = 'integer' AND typeof(denied_ns) = 'integer' AND "
-    "typeof(updated_ns) = 'integer' AND typeof(sequence) = 'integer' AND "
-    "typeof(witnesses) = 'text' AND length(CAST(witnesses AS BLOB)) <= 4096";
-constexpr char kSoundMapChangeEvent[] =
-    "typeof(previous_sequence) = 'integer' AND typeof(from_state) IN ('integer', 'null') AND "
-    "typeof(to_state) = 'integer' AND typeof(reason) = 'text' AND "
-    "length(CAST(reason AS BLOB)) <= 200 AND typeof(at_ns) = 'integer'";
+std::string IsSoundMapChange(const Dialect& dialect) {
+  return dialect.AreTexts({{"uuid", 36}, {"class_name", 64}, {"witnesses", 4096}}) + " AND " +
+         dialect.AreNumbers({"confidence", "latitude", "longitude", "covariance_ee",
+                             "covariance_en", "covariance_nn"}) +
+         " AND " +
+         dialect.AreIntegers({"vanished", "state", "reports", "drives", "first_seen_ns",
+                              "last_seen_ns", "denied_ns", "updated_ns", "sequence"});
+}
+std::string IsSoundMapChangeEvent(const Dialect& dialect) {
+  return dialect.AreIntegers({"previous_sequence", "to_state", "at_ns"}) + " AND " +
+         dialect.IsIntegerOrNull("from_state") + " AND " + dialect.AreTexts({{"reason", 200}});
+}
 
 /// Why these are no values of a map change; nullptr when they are.
 template <typename Row>
@@ -51,60 +47,78 @@ const char* WhyNoMapChange(const Row& row, const MapChangeFeature& feature) {
 
 }  // namespace
 
-MapChangeTable::MapChangeTable(soci::session& session)
-    : session_(session),
-      find_report_((session.prepare
-                        << "SELECT CASE WHEN typeof(change_uuid) = 'text' THEN "
-                           "substr(change_uuid, 1, 37) ELSE '' END, CASE WHEN typeof(vehicle_id) = "
-                           "'text' THEN substr(vehicle_id, 1, 65) ELSE '' END "
-                           "FROM map_change_reports WHERE uuid = :uuid",
+MapChangeTable::MapChangeTable(StoreConnection& connection)
+    : connection_(connection),
+      find_report_((connection.session().prepare
+                        << "SELECT " << connection.dialect().TextOrEmpty("change_uuid", 37) << ", "
+                        << connection.dialect().TextOrEmpty("vehicle_id", 65)
+                        << " FROM map_change_reports WHERE uuid = :uuid",
                     soci::use(row_.uuid), soci::into(row_.change_uuid),
                     soci::into(row_.vehicle_id))),
-      find_event_((session.prepare
+      find_event_((connection.session().prepare
                        << "SELECT previous_sequence, from_state, to_state, reason, at_ns FROM "
                           "map_change_events WHERE sequence = :s AND "
-                       << kSoundMapChangeEvent,
+                       << IsSoundMapChangeEvent(connection.dialect()),
                    soci::use(row_.sequence), soci::into(row_.previous_sequence),
                    soci::into(row_.from_state, row_.has_from), soci::into(row_.state),
                    soci::into(row_.reason), soci::into(row_.updated_ns))),
-      write_((
-          session.prepare
-              << "INSERT OR REPLACE INTO map_changes (id, uuid, class_name, vanished, state, "
-                 "confidence, latitude, longitude, covariance_ee, covariance_en, covariance_nn, "
-                 "reports, drives, vehicles, first_seen_ns, last_seen_ns, denied_ns, updated_ns, "
-                 "sequence, witnesses) VALUES (:i, :u, :c, :va, :st, :co, :la, :lo, :ee, :en, :nn, "
-                 ":re, :dr, :ve, :fi, :ls, :de, :up, :se, :wi)",
-          soci::use(row_.id), soci::use(row_.uuid), soci::use(row_.class_name),
-          soci::use(row_.vanished), soci::use(row_.state), soci::use(row_.confidence),
-          soci::use(row_.latitude), soci::use(row_.longitude), soci::use(row_.covariance_ee),
-          soci::use(row_.covariance_en), soci::use(row_.covariance_nn), soci::use(row_.reports),
-          soci::use(row_.drives), soci::use(row_.vehicles), soci::use(row_.first_seen_ns),
-          soci::use(row_.last_seen_ns), soci::use(row_.denied_ns), soci::use(row_.updated_ns),
-          soci::use(row_.sequence), soci::use(row_.witnesses))),
+      write_(connection,
+             "INSERT INTO map_changes (id, uuid, class_name, vanished, state, "
+             "confidence, latitude, longitude, covariance_ee, covariance_en, covariance_nn, "
+             "reports, drives, vehicles, first_seen_ns, last_seen_ns, denied_ns, updated_ns, "
+             "sequence, witnesses) VALUES (:i, :u, :c, :va, :st, :co, :la, :lo, :ee, :en, :nn, "
+             ":re, :dr, :ve, :fi, :ls, :de, :up, :se, :wi) ON CONFLICT (id) DO UPDATE SET "
+             "uuid = excluded.uuid, class_name = excluded.class_name, "
+             "vanished = excluded.vanished, state = excluded.state, "
+             "confidence = excluded.confidence, latitude = excluded.latitude, "
+             "longitude = excluded.longitude, covariance_ee = excluded.covariance_ee, "
+             "covariance_en = excluded.covariance_en, covariance_nn = excluded.covariance_nn, "
+             "reports = excluded.reports, drives = excluded.drives, "
+             "vehicles = excluded.vehicles, first_seen_ns = excluded.first_seen_ns, "
+             "last_seen_ns = excluded.last_seen_ns, denied_ns = excluded.denied_ns, "
+             "updated_ns = excluded.updated_ns, sequence = excluded.sequence, "
+             "witnesses = excluded.witnesses",
+             {row_.id,
+              row_.uuid,
+              row_.class_name,
+              row_.vanished,
+              row_.state,
+              row_.confidence,
+              row_.latitude,
+              row_.longitude,
+              row_.covariance_ee,
+              row_.covariance_en,
+              row_.covariance_nn,
+              row_.reports,
+              row_.drives,
+              row_.vehicles,
+              row_.first_seen_ns,
+              row_.last_seen_ns,
+              row_.denied_ns,
+              row_.updated_ns,
+              row_.sequence,
+              row_.witnesses}),
       write_report_(
-          (session.prepare
-               << "INSERT INTO map_change_reports (uuid, change_uuid, vehicle_id, drive_id, "
-                  "stamp_ns, "
-                  "earlier_stamp_ns, received_ns, class_name, vanished, confidence, seen, missed, "
-                  "latitude, longitude, covariance_ee, covariance_en, covariance_nn) VALUES (:u, "
-                  ":c, "
-                  ":v, :d, :st, :ea, :re, :cl, :va, :co, :se, :mi, :la, :lo, :ee, :en, :nn)",
-           soci::use(row_.uuid), soci::use(row_.change_uuid), soci::use(row_.vehicle_id),
-           soci::use(row_.drive_id), soci::use(row_.stamp_ns), soci::use(row_.earlier_stamp_ns),
-           soci::use(row_.received_ns), soci::use(row_.class_name), soci::use(row_.vanished),
-           soci::use(row_.confidence), soci::use(row_.seen), soci::use(row_.missed),
-           soci::use(row_.latitude), soci::use(row_.longitude), soci::use(row_.covariance_ee),
-           soci::use(row_.covariance_en), soci::use(row_.covariance_nn))),
-      write_event_((session.prepare
-                        << "INSERT INTO map_change_events (sequence, change_id, previous_sequence, "
-                           "from_state, to_state, reason, at_ns) VALUES (:s, :i, :p, :f, :t, :r, "
-                           ":a)",
-                    soci::use(row_.sequence), soci::use(row_.id), soci::use(row_.previous_sequence),
-                    soci::use(row_.from_state, row_.has_from), soci::use(row_.state),
-                    soci::use(row_.reason), soci::use(row_.updated_ns))),
-      drop_((session.prepare << "DELETE FROM map_changes WHERE id = :i", soci::use(row_.id))),
-      drop_events_((session.prepare << "DELETE FROM map_change_events WHERE change_id = :i",
-                    soci::use(row_.id))) {}
+          connection,
+          "INSERT INTO map_change_reports (uuid, change_uuid, vehicle_id, drive_id, "
+          "stamp_ns, "
+          "earlier_stamp_ns, received_ns, class_name, vanished, confidence, seen, missed, "
+          "latitude, longitude, covariance_ee, covariance_en, covariance_nn) VALUES (:u, "
+          ":c, "
+          ":v, :d, :st, :ea, :re, :cl, :va, :co, :se, :mi, :la, :lo, :ee, :en, :nn)",
+          {row_.uuid, row_.change_uuid, row_.vehicle_id, row_.drive_id, row_.stamp_ns,
+           row_.earlier_stamp_ns, row_.received_ns, row_.class_name, row_.vanished, row_.confidence,
+           row_.seen, row_.missed, row_.latitude, row_.longitude, row_.covariance_ee,
+           row_.covariance_en, row_.covariance_nn}),
+      write_event_(
+          connection,
+          "INSERT INTO map_change_events (sequence, change_id, previous_sequence, "
+          "from_state, to_state, reason, at_ns) VALUES (:s, :i, :p, :f, :t, :r, "
+          ":a)",
+          {row_.sequence, row_.id, row_.previous_sequence,
+           BoundPlace(row_.from_state, row_.has_from), row_.state, row_.reason, row_.updated_ns}),
+      drop_(connection, "DELETE FROM map_changes WHERE id = :i", {row_.id}),
+      drop_events_(connection, "DELETE FROM map_change_events WHERE change_id = :i", {row_.id}) {}
 
 ZoneStore::MapChangeRow MapChangeTable::ToMapChange(const Row& row) {
   ZoneStore::MapChangeRow result;
@@ -146,24 +160,24 @@ StoreDamage MapChangeTable::Load(const std::function<void(ZoneStore::MapChangeRo
     using soci::into;
     Row row;
     soci::statement query =
-        (session_.prepare
+        (connection_.session().prepare
              << "SELECT id, uuid, class_name, vanished, state, confidence, latitude, longitude, "
                 "covariance_ee, covariance_en, covariance_nn, reports, drives, first_seen_ns, "
                 "last_seen_ns, denied_ns, updated_ns, sequence, witnesses FROM map_changes WHERE "
-             << kSoundMapChange << " ORDER BY sequence, id",
+             << IsSoundMapChange(connection_.dialect()) << " ORDER BY sequence, id",
          into(row.id), into(row.uuid), into(row.class_name), into(row.vanished), into(row.state),
          into(row.confidence), into(row.latitude), into(row.longitude), into(row.covariance_ee),
          into(row.covariance_en), into(row.covariance_nn), into(row.reports), into(row.drives),
          into(row.first_seen_ns), into(row.last_seen_ns), into(row.denied_ns), into(row.updated_ns),
          into(row.sequence), into(row.witnesses));
-    return LoadRows(session_, "map_changes", query, [&] { take(ToMapChange(row)); });
+    return LoadRows(connection_, "map_changes", query, [&] { take(ToMapChange(row)); });
   });
 }
 
 std::uint64_t MapChangeTable::LastId() {
   return ExplainStore("reading the newest map change", [&] {
     long long id = 0;
-    session_ << "SELECT coalesce(max(id), 0) FROM map_changes WHERE id <= :most",
+    connection_.session() << "SELECT coalesce(max(id), 0) FROM map_changes WHERE id <= :most",
         soci::use(kMaxRowId), soci::into(id);
     return static_cast<std::uint64_t>(std::max(id, 0LL));
   });
@@ -173,7 +187,7 @@ std::optional<ZoneStore::KnownMapChangeReport> MapChangeTable::FindReport(const 
   return ExplainStore("looking up a map change",
                       [&]() -> std::optional<ZoneStore::KnownMapChangeReport> {
                         row_.uuid = report_uuid.ToString();
-                        if (!FetchOne(find_report_)) return std::nullopt;
+                        if (!FetchOne(connection_, find_report_)) return std::nullopt;
                         return ZoneStore::KnownMapChangeReport{
                             Uuid::Parse(row_.change_uuid).value_or(Uuid{}), row_.vehicle_id};
                       });
@@ -182,7 +196,7 @@ std::optional<ZoneStore::KnownMapChangeReport> MapChangeTable::FindReport(const 
 std::vector<StoredMapChangeEvent> MapChangeTable::LoadEvents(std::uint64_t sequence,
                                                              std::size_t limit) {
   return ExplainStore("reading events of a map change", [&] {
-    return WalkEvents(sequence, limit, find_event_, row_, [](const auto& read) {
+    return WalkEvents(connection_, sequence, limit, find_event_, row_, [](const auto& read) {
       return EventOf<StoredMapChangeEvent>(read, kMapChangeStates);
     });
   });
@@ -207,15 +221,15 @@ void MapChangeTable::Write(const ZoneStore::MapChangeRow& written) {
     row_.updated_ns = feature.updated_ns;
     row_.sequence = static_cast<long long>(feature.sequence);
     row_.witnesses = PackWitnesses(feature.witnesses);
-    write_.execute(true);
+    write_.Execute();
   });
 }
 
 void MapChangeTable::Drop(std::uint64_t id) {
   ExplainStore("forgetting a map change", [&] {
     row_.id = static_cast<long long>(id);
-    drop_.execute(true);
-    drop_events_.execute(true);
+    drop_.Execute();
+    drop_events_.Execute();
   });
 }
 
@@ -235,7 +249,7 @@ void MapChangeTable::WriteReport(const protocol::MapChangeReport& report, const 
     row_.seen = report.seen;
     row_.missed = report.missed;
     PutPlace(report.position, report.covariance_m2);
-    write_report_.execute(true);
+    write_report_.Execute();
   });
 }
 
@@ -249,7 +263,7 @@ void MapChangeTable::WriteEvent(const MapChangeEvent& event, std::uint64_t id) {
     row_.state = static_cast<int>(event.feature.state);
     row_.reason = event.reason;
     row_.updated_ns = event.feature.updated_ns;
-    write_event_.execute(true);
+    write_event_.Execute();
   });
 }
 

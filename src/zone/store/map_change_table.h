@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -18,8 +19,8 @@ namespace livemap::zone {
 /// now, what vehicles said of them, and their history.
 class MapChangeTable {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit MapChangeTable(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit MapChangeTable(StoreConnection& connection);
   MapChangeTable(const MapChangeTable&) = delete;
   MapChangeTable& operator=(const MapChangeTable&) = delete;
 
@@ -51,15 +52,15 @@ class MapChangeTable {
   static ZoneStore::MapChangeRow ToMapChange(const Row& row);
   void PutPlace(const geo::GeoPoint& position, const Eigen::Matrix2d& covariance_m2);
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
   soci::statement find_report_;
   soci::statement find_event_;
-  soci::statement write_;
-  soci::statement write_report_;
-  soci::statement write_event_;
-  soci::statement drop_;
-  soci::statement drop_events_;
+  WriteStatement write_;
+  WriteStatement write_report_;
+  WriteStatement write_event_;
+  WriteStatement drop_;
+  WriteStatement drop_events_;
 };
 
 }  // namespace livemap::zone

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -17,8 +18,8 @@ namespace livemap::zone {
 /// The table `places`: where each vehicle was, as far as the rule of speed remembers it.
 class PlaceTable {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit PlaceTable(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit PlaceTable(StoreConnection& connection);
   PlaceTable(const PlaceTable&) = delete;
   PlaceTable& operator=(const PlaceTable&) = delete;
 
@@ -40,11 +41,11 @@ class PlaceTable {
 
   static KnownPlace ToPlace(const Row& row);
 
-  soci::session& session_;
+  StoreConnection& connection_;
   Row row_;
   soci::statement find_;
-  soci::statement write_;
-  soci::statement drop_;
+  WriteStatement write_;
+  WriteStatement drop_;
   soci::statement next_;
   soci::statement prune_;
 };

@@ -4,12 +4,12 @@
 
 namespace livemap::zone {
 
-StoreDamage LoadRows(soci::session& session, const std::string& table, soci::statement& query,
+StoreDamage LoadRows(StoreConnection& connection, const std::string& table, soci::statement& query,
                      const std::function<void()>& take_row) {
   StoreDamage damage;
   long long rows = 0;
-  session << "SELECT count(*) FROM " << table, soci::into(rows);
-  query.execute();
+  connection.session() << "SELECT count(*) FROM " << table, soci::into(rows);
+  connection.Run(query);
   while (query.fetch()) {
     --rows;
     try {

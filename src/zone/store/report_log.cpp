@@ -6,42 +6,42 @@
 #include "zone/store/queries.h"
 
 namespace livemap::zone {
-ReportLog::ReportLog(soci::session& session)
-    // A report whose hazard is broken is known all the same: its uuid is taken.
-    : find_report_(
-          (session.prepare << "SELECT CASE WHEN typeof(h.uuid) = 'text' THEN substr(h.uuid, 1, 37) "
-                              "ELSE '' END, CASE WHEN typeof(r.vehicle_id) = 'text' THEN "
-                              "substr(r.vehicle_id, 1, 65) ELSE '' END FROM reports r LEFT JOIN "
-                              "hazards h ON h.id = r.hazard_id WHERE r.uuid = :uuid",
-           soci::use(row_.uuid), soci::into(row_.hazard_uuid), soci::into(row_.vehicle_id))),
+ReportLog::ReportLog(StoreConnection& connection)
+    : connection_(connection),
+      // A report whose hazard is broken is known all the same: its uuid is taken.
+      find_report_((connection.session().prepare
+                        << "SELECT " << connection.dialect().TextOrEmpty("h.uuid", 37) << ", "
+                        << connection.dialect().TextOrEmpty("r.vehicle_id", 65)
+                        << " FROM reports r LEFT JOIN "
+                           "hazards h ON h.id = r.hazard_id WHERE r.uuid = :uuid",
+                    soci::use(row_.uuid), soci::into(row_.hazard_uuid),
+                    soci::into(row_.vehicle_id))),
       write_report_(
-          (session.prepare
-               << "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
-                  "received_ns, confidence, latitude, longitude, covariance_ee, covariance_en, "
-                  "covariance_nn, image_sha256) VALUES "
-                  "(:u, :h, :v, :d, :st, :re, :co, :la, :lo, :ee, :en, :nn, :im)",
-           soci::use(row_.uuid), soci::use(row_.hazard_id), soci::use(row_.vehicle_id),
-           soci::use(row_.drive_id), soci::use(row_.stamp_ns), soci::use(row_.received_ns),
-           soci::use(row_.confidence), soci::use(row_.latitude), soci::use(row_.longitude),
-           soci::use(row_.covariance_ee), soci::use(row_.covariance_en),
-           soci::use(row_.covariance_nn), soci::use(row_.image_sha256))),
-      write_box_((session.prepare << "INSERT INTO report_boxes (hazard_id, image_sha256, box_left, "
-                                     "box_top, box_right, box_bottom) VALUES (:h, :i, :l, :t, :r, "
-                                     ":b)",
-                  soci::use(row_.hazard_id), soci::use(row_.image_sha256), soci::use(row_.box_left),
-                  soci::use(row_.box_top), soci::use(row_.box_right), soci::use(row_.box_bottom))),
-      write_answer_((session.prepare
-                         << "INSERT INTO answers (poll_uuid, hazard_id, vehicle_id, answer, "
-                            "reason, confidence, "
-                            "stamp_ns, received_ns) VALUES (:u, :h, :v, :a, :r, :c, :st, :re)",
-                     soci::use(row_.uuid), soci::use(row_.hazard_id), soci::use(row_.vehicle_id),
-                     soci::use(row_.answer), soci::use(row_.reason), soci::use(row_.confidence),
-                     soci::use(row_.stamp_ns), soci::use(row_.received_ns))) {}
+          connection,
+          "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
+          "received_ns, confidence, latitude, longitude, covariance_ee, covariance_en, "
+          "covariance_nn, image_sha256) VALUES "
+          "(:u, :h, :v, :d, :st, :re, :co, :la, :lo, :ee, :en, :nn, :im)",
+          {row_.uuid, row_.hazard_id, row_.vehicle_id, row_.drive_id, row_.stamp_ns,
+           row_.received_ns, row_.confidence, row_.latitude, row_.longitude, row_.covariance_ee,
+           row_.covariance_en, row_.covariance_nn, row_.image_sha256}),
+      write_box_(connection,
+                 "INSERT INTO report_boxes (hazard_id, image_sha256, box_left, "
+                 "box_top, box_right, box_bottom) VALUES (:h, :i, :l, :t, :r, "
+                 ":b)",
+                 {row_.hazard_id, row_.image_sha256, row_.box_left, row_.box_top, row_.box_right,
+                  row_.box_bottom}),
+      write_answer_(connection,
+                    "INSERT INTO answers (poll_uuid, hazard_id, vehicle_id, answer, "
+                    "reason, confidence, "
+                    "stamp_ns, received_ns) VALUES (:u, :h, :v, :a, :r, :c, :st, :re)",
+                    {row_.uuid, row_.hazard_id, row_.vehicle_id, row_.answer, row_.reason,
+                     row_.confidence, row_.stamp_ns, row_.received_ns}) {}
 
 std::optional<ZoneStore::KnownReport> ReportLog::FindReport(const Uuid& report_uuid) {
   return ExplainStore("looking up a report", [&]() -> std::optional<ZoneStore::KnownReport> {
     row_.uuid = report_uuid.ToString();
-    if (!FetchOne(find_report_)) return std::nullopt;
+    if (!FetchOne(connection_, find_report_)) return std::nullopt;
     return ZoneStore::KnownReport{Uuid::Parse(row_.hazard_uuid).value_or(Uuid{}), row_.vehicle_id};
   });
 }
@@ -62,7 +62,7 @@ void ReportLog::WriteReport(const protocol::Report& report, std::uint64_t hazard
     row_.covariance_en = report.covariance_m2(0, 1);
     row_.covariance_nn = report.covariance_m2(1, 1);
     row_.image_sha256 = image_sha256;
-    write_report_.execute(true);
+    write_report_.Execute();
     if (!image_sha256.empty()) WriteBox(report);
   });
 }
@@ -79,7 +79,7 @@ void ReportLog::WriteBox(const protocol::Report& report) {
   row_.box_right = share(report.box.x_max, shown.x, shown.width);
   row_.box_bottom = share(report.box.y_max, shown.y, shown.height);
   const bool is_shown = row_.box_left < row_.box_right && row_.box_top < row_.box_bottom;
-  if (is_shown) write_box_.execute(true);
+  if (is_shown) write_box_.Execute();
 }
 
 void ReportLog::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
@@ -93,7 +93,7 @@ void ReportLog::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t ha
     row_.confidence = static_cast<double>(answer.confidence);
     row_.stamp_ns = answer.stamp_ns;
     row_.received_ns = received_ns;
-    write_answer_.execute(true);
+    write_answer_.Execute();
   });
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
 
 namespace livemap::zone {
@@ -14,8 +15,8 @@ namespace livemap::zone {
 /// The tables `reports` and `answers`: all that vehicles said of hazards.
 class ReportLog {
  public:
-  /// Keeps the reference; the schema is up to date.
-  explicit ReportLog(soci::session& session);
+  /// Keeps the connection; the schema is up to date.
+  explicit ReportLog(StoreConnection& connection);
   ReportLog(const ReportLog&) = delete;
   ReportLog& operator=(const ReportLog&) = delete;
 
@@ -39,11 +40,12 @@ class ReportLog {
 
   void WriteBox(const protocol::Report& report);
 
+  StoreConnection& connection_;
   Row row_;
   soci::statement find_report_;
-  soci::statement write_report_;
-  soci::statement write_box_;
-  soci::statement write_answer_;
+  WriteStatement write_report_;
+  WriteStatement write_box_;
+  WriteStatement write_answer_;
 };
 
 }  // namespace livemap::zone

@@ -1,19 +1,21 @@
 #pragma once
 
 // Part of ZoneStore; nobody else includes this.
-#include <soci/soci.h>
-#include <soci/sqlite3/soci-sqlite3.h>
-
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/mutex.h"
+#include "common/sqlite.h"
 #include "zone/store/decision_table.h"
 #include "zone/store/desk_table.h"
 #include "zone/store/event_log.h"
 #include "zone/store/map_change_table.h"
+#include "zone/store/queries.h"
+#include "zone/store/store_connection.h"
 
 namespace livemap::zone {
 
@@ -21,70 +23,80 @@ namespace livemap::zone {
 /// for histories without pause keeps no commit waiting.
 class StoredHistories {
  public:
-  /// `connection` is SOCI's text for a database whose schema is up to date. Throws soci_error where
-  /// it cannot be opened.
-  explicit StoredHistories(const std::string& connection)
-      : session_(soci::sqlite3, connection),
-        events_(OnlyReading(session_)),
-        map_changes_(session_),
-        decisions_(session_),
-        desk_(session_) {}
+  /// Of a database whose schema is up to date. Throws as StoreConnection does.
+  explicit StoredHistories(std::string database)
+      : database_(std::move(database)), reader_(std::make_unique<Reader>(database_)) {}
 
   /// EventLog::Load. Throws as that does.
   std::vector<StoredEvent> OfHazard(const Uuid& hazard, std::uint64_t sequence, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return events_.Load(hazard, sequence, limit);
+    return Ask([&](Reader& reader) { return reader.events.Load(hazard, sequence, limit); });
   }
   /// MapChangeTable::LoadEvents. Throws as that does.
   std::vector<StoredMapChangeEvent> OfMapChange(std::uint64_t sequence, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return map_changes_.LoadEvents(sequence, limit);
+    return Ask([&](Reader& reader) { return reader.map_changes.LoadEvents(sequence, limit); });
   }
   /// DecisionTable::LoadAllDecisions. Throws as that does.
   std::vector<DecisionRecord> OfOfficials(std::uint64_t before, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return decisions_.LoadAllDecisions(before, limit);
+    return Ask([&](Reader& reader) { return reader.decisions.LoadAllDecisions(before, limit); });
   }
   /// DecisionTable::LoadDecisions. Throws as that does.
   std::vector<DecisionRecord> OfSubject(const std::string& subject, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return decisions_.LoadDecisions(subject, limit);
+    return Ask([&](Reader& reader) { return reader.decisions.LoadDecisions(subject, limit); });
   }
   /// DeskTable::LoadAssignments. Throws as that does.
   std::vector<Assignment> Assignments() {
-    const MutexLock lock(mutex_);
-    return desk_.LoadAssignments();
+    return Ask([&](Reader& reader) { return reader.desk.LoadAssignments(); });
   }
   /// DeskTable::LoadSightings. Throws as that does.
   std::vector<SightingRecord> Sightings(std::uint64_t hazard_id, const Uuid& hazard,
                                         std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return desk_.LoadSightings(hazard_id, hazard, limit);
+    return Ask([&](Reader& reader) { return reader.desk.LoadSightings(hazard_id, hazard, limit); });
   }
 
   /// EventLog::LoadTurnsAfter. Throws as that does.
   std::vector<StoredEvent> TurnsAfter(std::uint64_t sequence, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return events_.LoadTurnsAfter(sequence, limit);
+    return Ask([&](Reader& reader) { return reader.events.LoadTurnsAfter(sequence, limit); });
   }
   /// DecisionTable::LoadDecisionsAfter. Throws as that does.
   std::vector<DecisionRecord> DecisionsAfter(std::uint64_t id, std::size_t limit) {
-    const MutexLock lock(mutex_);
-    return decisions_.LoadDecisionsAfter(id, limit);
+    return Ask([&](Reader& reader) { return reader.decisions.LoadDecisionsAfter(id, limit); });
   }
 
  private:
-  static soci::session& OnlyReading(soci::session& session) {
-    session << "PRAGMA query_only=ON";
-    return session;
+  struct Reader {
+    explicit Reader(const std::string& database)
+        : connection(database, StoreConnection::Use::kRead),
+          events(connection),
+          map_changes(connection),
+          decisions(connection),
+          desk(connection) {}
+
+    StoreConnection connection;
+    EventLog events;
+    MapChangeTable map_changes;
+    DecisionTable decisions;
+    DeskTable desk;
+  };
+
+  /// Once more over a new connection where the old one has broken.
+  template <typename Body>
+  auto Ask(const Body& body) -> decltype(body(std::declval<Reader&>())) {
+    const MutexLock lock(mutex_);
+    if (reader_ && !reader_->connection.IsLost()) {
+      try {
+        return body(*reader_);
+      } catch (const StoreError&) {
+        if (!reader_->connection.IsLost()) throw;
+      }
+    }
+    reader_ = nullptr;
+    reader_ = ExplainStore("connecting again", [&] { return std::make_unique<Reader>(database_); });
+    return body(*reader_);
   }
 
   Mutex mutex_;
-  soci::session session_;
-  EventLog events_ GUARDED_BY(mutex_);
-  MapChangeTable map_changes_ GUARDED_BY(mutex_);
-  DecisionTable decisions_ GUARDED_BY(mutex_);
-  DeskTable desk_ GUARDED_BY(mutex_);
+  const std::string database_;
+  std::unique_ptr<Reader> reader_ GUARDED_BY(mutex_);
 };
 
 }  // namespace livemap::zone

@@ -1,16 +1,19 @@
 #pragma once
 
-#include <soci/soci.h>
-
 #include <string>
+
+#include "zone/store/store_connection.h"
 
 namespace livemap::zone {
 
 /// The schema that this program writes.
 constexpr int kZoneSchemaVersion = 8;
 
-/// Brings the database at `path`, which `session` has open, up to date, step by step, each step in
-/// its own transaction. Throws StoreError when it is of a newer schema.
-void MigrateZoneStore(soci::session& session, const std::string& path);
+/// The first that databases of PostgreSQL have.
+constexpr int kPostgresqlBegins = 8;
+
+/// Brings the database up to date, step by step, each step in its own transaction; sentences call
+/// it `database`. Throws StoreError when it is of a newer schema.
+void MigrateZoneStore(StoreConnection& connection, const std::string& database);
 
 }  // namespace livemap::zone

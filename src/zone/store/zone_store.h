@@ -34,17 +34,24 @@ struct Withdrawal {
 
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
 /// was learned of classes and of vehicles, where each vehicle was, and the same of map changes.
-/// SQLite in WAL mode with synchronous=FULL, through SOCI. Not thread-safe: one writer owns it.
+/// Through SOCI in SQLite, in WAL mode with synchronous=FULL, or in PostgreSQL with
+/// synchronous_commit. Not thread-safe: one writer owns it.
 /// Only those that say so, LoadEvents and LoadMapChangeEvents may be called by any thread at any
 /// time: they read what is committed, over a connection of their own, so that nobody who reads a
 /// history keeps the writer waiting.
 ///
-/// Every function throws StoreError with the database's own words when it fails.
+/// Every function throws StoreError with the database's own words when it fails. A server that goes
+/// away makes them fail until it is back; the next call connects again. Then nothing of the running
+/// transaction is there: even where the server had gone while it committed, Commit throws only if
+/// it did not. Where that cannot be told in time, or somebody else has written, every further
+/// function throws, as what is in the zone's memory is not what the database holds.
 class ZoneStore {
  public:
-  /// Opens or makes the database file and brings its schema up to date. Refuses files that are
-  /// damaged, no database at all, or of a newer schema than this program knows.
-  explicit ZoneStore(const std::string& path);
+  /// Opens the database and brings its schema up to date: the SQLite file at this path, which is
+  /// made when missing, or what a `postgresql://` URL names (CheckedPostgresqlUrl). Refuses files
+  /// that are damaged, no database at all, or of a newer schema than this program knows, and a
+  /// PostgreSQL database that another store has open.
+  explicit ZoneStore(const std::string& database);
   ~ZoneStore();
   ZoneStore(const ZoneStore&) = delete;
   ZoneStore& operator=(const ZoneStore&) = delete;

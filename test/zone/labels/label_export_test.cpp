@@ -51,7 +51,7 @@ class LabelExportTest : public ZoneTest {
   }
   std::string WhyRefused() const {
     try {
-      ExportLabels(directory_ + "/zone", Out());
+      ExportLabels(directory_ + "/zone", Out(), store_url_);
     } catch (const Error& error) {
       return error.what();
     }
@@ -64,7 +64,7 @@ class LabelExportTest : public ZoneTest {
 TEST_F(LabelExportTest, AConfirmedHazardIsLabelledByItsBoxInThePicture) {
   const Uuid hazard = zone_->Handle(ReportWithPicture("pothole", 90, -79.94)).hazard_uuid;
   zone_->Confirm(hazard, "Miller, \"J\"");
-  const LabelExport done = ExportLabels(directory_ + "/zone", Out());
+  const LabelExport done = ExportLabels(directory_ + "/zone", Out(), store_url_);
   EXPECT_EQ(done.pictures, 1U);
   EXPECT_EQ(done.boxes, 1U);
   EXPECT_EQ(done.backgrounds, 0U);
@@ -87,7 +87,7 @@ TEST_F(LabelExportTest, ARejectedHazardIsBackgroundAndAnUndecidedOneNeither) {
   protocol::Report other = ReportWithPicture("debris", 90, -79.80);
   other.box = {100, 200, 160, 280};
   zone_->Handle(other);
-  const LabelExport done = ExportLabels(directory_ + "/zone", Out());
+  const LabelExport done = ExportLabels(directory_ + "/zone", Out(), store_url_);
   EXPECT_EQ(done.pictures, 1U);
   EXPECT_EQ(done.backgrounds, 1U);
   EXPECT_EQ(TextOf(Out() + "/labels/" + OnlyFile("labels")), "");
@@ -104,7 +104,7 @@ TEST_F(LabelExportTest, WhatWasUndoneIsNoDecision) {
   zone_->Confirm(hazard, "miller");
   zone_->Reject(hazard, "jones", "a shadow");
   zone_->Undo(hazard, "jones");
-  EXPECT_EQ(ExportLabels(directory_ + "/zone", Out()).boxes, 1U) << "the confirmation stands";
+  EXPECT_EQ(ExportLabels(directory_ + "/zone", Out(), store_url_).boxes, 1U) << "the confirmation stands";
 }
 
 TEST_F(LabelExportTest, CountsWhatIsLeftOut) {
@@ -114,7 +114,7 @@ TEST_F(LabelExportTest, CountsWhatIsLeftOut) {
   zone_->Confirm(zone_->Handle(ReportWithPicture("pothole", 92, -79.70)).hazard_uuid, "miller");
   const auto picture = zone_->Query(std::nullopt, 0, 10).back().image_sha256;
   std::filesystem::remove(*zone_->ImagePath(picture));
-  const LabelExport done = ExportLabels(directory_ + "/zone", Out());
+  const LabelExport done = ExportLabels(directory_ + "/zone", Out(), store_url_);
   EXPECT_EQ(done.pictures, 1U);
   EXPECT_EQ(done.no_box, 1U);
   EXPECT_EQ(done.odd_classes, 1U);
@@ -131,7 +131,7 @@ TEST_F(LabelExportTest, TheTrainingReadsIt) {
   zone_->Confirm(zone_->Handle(ReportWithPicture("pothole", 90, -79.94)).hazard_uuid, "miller");
   zone_->Reject(zone_->Handle(ReportWithPicture("pothole", 91, -79.90)).hazard_uuid, "miller",
                 "no");
-  ExportLabels(directory_ + "/zone", Out());
+  ExportLabels(directory_ + "/zone", Out(), store_url_);
   const std::string script = directory_ + "/read.py";
   std::ofstream(script) << "import sys, pathlib\n"
                            "sys.path.insert(0, sys.argv[1])\n"

@@ -20,7 +20,7 @@ class PlaceBookTest : public ZoneTest {
  protected:
   PlaceBookTest() {
     std::filesystem::create_directories(directory_ + "/zone");
-    store_ = std::make_unique<ZoneStore>(DatabasePath());
+    store_ = std::make_unique<ZoneStore>(Database());
   }
 
   /// Whether the vehicle can have been there, for a batch that is committed.
@@ -161,10 +161,10 @@ TEST_F(PlaceBookTest, CountsThatTheStoreDidNotTakeAreSavedByTheNextSweep) {
   EXPECT_TRUE(Reports(book, "car-1", kNowNs));
   EXPECT_TRUE(Reports(book, "car-1", kNowNs + kOneSecond));
   {
-    SqliteDatabase other(DatabasePath(), true);
-    other.Execute("CREATE TRIGGER no BEFORE UPDATE ON places BEGIN SELECT RAISE(ABORT, 'no'); END");
+    StoreProbe other = Probe();
+    other.Refuse("UPDATE", "places", "no");
     EXPECT_THROW(book.SaveCounts(), StoreError);
-    other.Execute("DROP TRIGGER no");
+    other.Accept("places");
   }
   book.SaveCounts();
   EXPECT_EQ(store_->FindPlaces("car-1", 1).at(0).count, 2U);

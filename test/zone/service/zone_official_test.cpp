@@ -42,12 +42,9 @@ class ZoneOfficialTest : public ZoneTest {
   std::string LastReason(const Uuid& hazard) { return Zone().Events(hazard, 1).front().reason; }
   /// What is held against the vehicles, as text.
   std::string Trust() {
-    SqliteDatabase database(DatabasePath(), true);
-    SqliteStatement query = database.Prepare(
-        "SELECT coalesce(group_concat(round(suspicion, 9), ' '), '') FROM trust "
-        "WHERE suspicion > 1e-9");
-    EXPECT_TRUE(query.Step());
-    return query.Text(0);
+    return Probe().Text(
+        "SELECT CAST(round(suspicion * 1e9) AS BIGINT) FROM trust WHERE suspicion > 1e-9 "
+        "ORDER BY vehicle_key");
   }
 
   std::int64_t now_ns_ = kNowNs;
@@ -96,10 +93,8 @@ TEST_F(ZoneOfficialTest, AnUndoneConfirmationLeavesVotesAndPresenceAlsoAfterARes
   EXPECT_EQ(Get(hazard).state, before.state);
   EXPECT_EQ(Get(hazard).presence, before.presence);
   EXPECT_EQ(LastReason(hazard), "confirm undone by Anna");
-  SqliteDatabase database(DatabasePath(), true);
-  SqliteStatement query = database.Prepare("SELECT coalesce(sum(stood_s), 0) FROM lives");
-  ASSERT_TRUE(query.Step());
-  EXPECT_NEAR(query.Real(0), 0, 1e-6) << "the class has learned nothing";
+  EXPECT_NEAR(Probe().Number("SELECT coalesce(sum(stood_s), 0) FROM lives"), 0, 1e-6)
+      << "the class has learned nothing";
 }
 
 TEST_F(ZoneOfficialTest, WhatVehiclesSaidSinceCountsOnTopOfAnUndo) {
@@ -342,12 +337,12 @@ TEST_F(ZoneOfficialTest, ADecisionThatStandsIsFoundBehindAnyNumberOfOthersAndBro
   ReportBy("car-2", {41, -79.94});
   EXPECT_EQ(Zone().Distrust("car-2", "Anna", "a"), 1U);
   const auto add = [this](int rows, int kind, const std::string& subject) {
-    SqliteDatabase(DatabasePath(), true)
-        .Execute("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < " +
-                 std::to_string(rows) +
-                 ") INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
-                 "undone_by, before, effects) SELECT " +
-                 std::to_string(kind) + ", '" + subject + "', 'Bert', '', 0, 0, 0, '', '' FROM n");
+    Probe().Execute("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < " +
+                    std::to_string(rows) +
+                    ") INSERT INTO decisions (kind, subject, official, reason, at_ns, hazards, "
+                    "undone_by, before, effects) SELECT " +
+                    std::to_string(kind) + ", '" + subject +
+                    "', 'Bert', '', 0, 0, 0, '', '' FROM n");
   };
   for (const std::string& subject : {hazard.ToString(), std::string("car-2")}) {
     add(1500, static_cast<int>(DecisionKind::kUndo), subject);
@@ -364,10 +359,9 @@ TEST_F(ZoneOfficialTest, ABrokenWithdrawalIsLeftOutAndToldAndTheOthersAreTakenBa
   for (int i = 0; i < 503; ++i) reports.push_back(MakeReport({40 + 1e-3 * i, -79.94}));
   Zone().HandleBatch(reports);
   EXPECT_EQ(Zone().Distrust("car-1", "Anna", "stolen"), 503U);
-  SqliteDatabase(DatabasePath(), true)
-      .Execute(
-          "UPDATE withdrawals SET hazard_uuid = '********-****-****-****-************' WHERE "
-          "hazard_uuid = (SELECT max(hazard_uuid) FROM withdrawals)");
+  Probe().Execute(
+      "UPDATE withdrawals SET hazard_uuid = '********-****-****-****-************' WHERE "
+      "hazard_uuid = (SELECT max(hazard_uuid) FROM withdrawals)");
   zone_.reset();
   EXPECT_EQ(Zone().Statistics().store_damage.rows, 1U);
   EXPECT_THAT(Zone().Statistics().store_damage.first, HasSubstr("withdrawals"));
@@ -409,12 +403,11 @@ TEST_F(ZoneOfficialTest, AHazardThatWasReportedAnewIsNotDoubledByTrust) {
 TEST_F(ZoneOfficialTest, AFailedUndoLeavesMemoryAndStoreAsTheyWere) {
   const Uuid hazard = ReportBy("car-1");
   EXPECT_TRUE(Zone().Reject(hazard, "Anna", "no"));
-  SqliteDatabase saboteur(DatabasePath(), true);
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE UPDATE ON hazards BEGIN SELECT RAISE(ABORT, 'full'); END");
+  StoreProbe saboteur = Probe();
+  saboteur.Refuse("UPDATE", "hazards", "full");
   EXPECT_THROW(Zone().Undo(hazard, "Anna"), StoreError);
   EXPECT_EQ(Get(hazard).state, HazardState::kRejected);
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("hazards");
   EXPECT_EQ(Zone().Undo(hazard, "Anna"), Undone::kDone);
 }
 

@@ -94,19 +94,13 @@ TEST_F(ZonePlacesTest, AfterARestartAPositionIsComparedWithWhatWasReported) {
 }
 
 TEST_F(ZonePlacesTest, NoPositionIsEverStored) {
-  const auto stored = [this](const std::string& sql) {
-    SqliteDatabase database(DatabasePath(), true);
-    SqliteStatement query = database.Prepare(sql);
-    EXPECT_TRUE(query.Step());
-    return query.Text(0);
-  };
   EXPECT_TRUE(Zone().UpdateVehicle(Position({40.4401, -79.94})));
   EXPECT_TRUE(Report(kPittsburgh, 1)) << "of the same five seconds";
   now_ns_ += 60 * kOneSecond;
   EXPECT_TRUE(Zone().UpdateVehicle(Position({40.4402, -79.94})));
   EXPECT_TRUE(Report(kPittsburgh, 30));
-  EXPECT_EQ(stored("SELECT group_concat(latitude, ' ') FROM places"), "40.44 40.44");
-  EXPECT_EQ(stored("SELECT count(*) FROM sqlite_master WHERE name = 'last_reports'"), "0");
+  EXPECT_EQ(Probe().Text("SELECT latitude FROM places"), "40.44 40.44");
+  EXPECT_THROW(Probe().Execute("SELECT 1 FROM last_reports"), StoreError) << "of older schemas";
   // What is in memory holds for both.
   EXPECT_FALSE(Report(kSydney, 0));
 }
@@ -116,10 +110,7 @@ TEST_F(ZonePlacesTest, TimeDropsStoredPlacesThatNoReportMayBeAsOldAs) {
   EXPECT_TRUE(Report(kPittsburgh, 10));
   now_ns_ += 15 * kOneDay;
   Zone().Advance();
-  SqliteDatabase database(DatabasePath(), true);
-  SqliteStatement rows = database.Prepare("SELECT count(*) FROM places");
-  ASSERT_TRUE(rows.Step());
-  EXPECT_EQ(rows.Int(0), 1);
+  EXPECT_EQ(Probe().Number("SELECT count(*) FROM places"), 1);
 }
 
 TEST_F(ZonePlacesTest, AFloodOfPositionsOutvotesNothing) {

@@ -183,11 +183,10 @@ TEST_F(ZoneRefusalTest, APictureCostsItsVehicleOnceAndOnlyWhenItsReportIsCommitt
     reports.push_back(MakeReport({40 + 0.01 * i, 8}));
     reports.back().image = MakeJpeg(64, 48, 10, i);
   }
-  SqliteDatabase saboteur(DatabasePath(), true);
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  StoreProbe saboteur = Probe();
+  saboteur.Refuse("INSERT", "events", "full");
   for (int i = 0; i < 5; ++i) EXPECT_THROW(zone.HandleBatch({reports[0]}), StoreError);
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("events");
   // Twice in one batch, and sent again.
   zone.HandleBatch({reports[0], reports[0]});
   zone.HandleBatch({reports[0]});

@@ -146,7 +146,7 @@ TEST_F(ZoneStreetsTest, ABrokenCourseInTheStoreIsLeftOutAndTold) {
     ZoneService zone(WithStreets(), Clock(), 1);
     hazard = Pass(zone, "car-1", 0, -4, kWest);
   }
-  SqliteDatabase(DatabasePath(), true).Execute("UPDATE hazard_courses SET course_rad = 99");
+  Probe().Execute("UPDATE hazard_courses SET course_rad = 99");
   ZoneService zone(WithStreets(), Clock(), 1);
   EXPECT_EQ(zone.Statistics().store_damage.rows, 1U);
   EXPECT_THAT(zone.Statistics().store_damage.first, testing::HasSubstr("course"));
@@ -157,11 +157,10 @@ TEST_F(ZoneStreetsTest, ABrokenCourseInTheStoreIsLeftOutAndTold) {
 TEST_F(ZoneStreetsTest, ACourseThatIsNotCommittedIsForgotten) {
   ZoneService zone(WithStreets(), Clock(), 1);
   const Uuid hazard = Pass(zone, "car-1", 0, -300, kNan);
-  SqliteDatabase saboteur(DatabasePath(), true);
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  StoreProbe saboteur = Probe();
+  saboteur.Refuse("INSERT", "events", "full");
   EXPECT_THROW(Pass(zone, "car-2", 0, -300, kEast), StoreError);
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("events");
   EXPECT_TRUE(std::isnan(zone.Find(hazard)->course_rad));
 }
 

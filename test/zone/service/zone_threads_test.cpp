@@ -74,8 +74,8 @@ TEST_F(ZoneThreadsTest, ReadersSeeOnlyWholeCommittedStatesWhileWritersCommit) {
 /// commit waits ten seconds and then fails.
 class SlowCommit {
  public:
-  SlowCommit(ZoneService& zone, const std::string& database) : other_(database, true) {
-    other_.Execute("BEGIN IMMEDIATE");
+  SlowCommit(ZoneService& zone, StoreProbe other) : other_(std::move(other)) {
+    other_.HoldWriters();
     writer_ = std::thread([this, &zone, report = MakeReport({1, 1})] {
       try {
         is_committed_ = zone.Handle(report).status == protocol::Receipt::Status::kCommitted;
@@ -87,13 +87,13 @@ class SlowCommit {
   }
   /// Whether it went well: nobody waited for it before.
   bool LetGo() {
-    other_.Execute("ROLLBACK");
+    other_.Release();
     writer_.join();
     return is_committed_;
   }
 
  private:
-  SqliteDatabase other_;
+  StoreProbe other_;
   std::thread writer_;
   bool is_committed_ = false;
 };
@@ -101,7 +101,7 @@ class SlowCommit {
 TEST_F(ZoneThreadsTest, TheNewestSequenceIsToldWhileACommitWaitsForTheDisk) {
   ZoneService zone(Config(), Clock(), 1);
   zone.Handle(MakeReport());
-  SlowCommit commit(zone, DatabasePath());
+  SlowCommit commit(zone, Probe());
   EXPECT_EQ(zone.Sequence(), 1U);
   EXPECT_EQ(zone.AnnouncedSequence(), 1U);
   EXPECT_TRUE(commit.LetGo());
@@ -132,7 +132,7 @@ TEST_F(ZoneThreadsTest, TheViewOfBeforeIsHandedOutWhileOneCallerWaitsForANewOne)
   ZoneService zone(Config(), Clock(), 1);
   zone.Handle(MakeReport());
   ASSERT_TRUE(zone.View());
-  SlowCommit commit(zone, DatabasePath());
+  SlowCommit commit(zone, Probe());
   std::atomic<int> views{0};
   std::vector<std::thread> callers;
   for (int i = 0; i < 2; ++i) {

@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/sqlite.h"
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 
@@ -23,40 +22,51 @@ class ZoneBrokenRowsTest : public ZoneTest {
     }
     return hazards;
   }
-  void Write(const std::string& sql) { SqliteDatabase(DatabasePath(), true).Execute(sql); }
+  void Write(const std::string& sql) { Probe().Execute(sql); }
+  /// For all databases, and for the one at hand: columns of SQLite take values of any type.
+  static std::vector<std::string> BrokenHazards() {
+    std::vector<std::string> broken{"latitude = 91",
+                                    "covariance_ee = -1",
+                                    "covariance_en = 5",
+                                    "covariance_nn = 1e300",
+                                    "confidence = 1.5",
+                                    "presence = -1",
+                                    "class_name = ''",
+                                    "uuid = 'x'",
+                                    "sightings = 0",
+                                    "sightings = 4294967296",
+                                    "first_seen_ns = -1",
+                                    "last_seen_ns = 9223372036854775807",
+                                    "sequence = 9223372036854775807",
+                                    "announced_sequence = 99",
+                                    "state = 7",
+                                    "state = 2",
+                                    "life = '1 2 3'",
+                                    "image_sha256 = '../../etc/passwd'",
+                                    "vehicles = -1"};
+    const std::vector<std::string> more =
+        IsOnPostgresql() ? std::vector<std::string>{"latitude = 'Infinity'",
+                                                    "longitude = 'NaN'",
+                                                    "covariance_ee = '-Infinity'",
+                                                    "class_name = repeat('x', 100000)",
+                                                    "class_name = E'\\x01'",
+                                                    "life = repeat('1 ', 100000)"}
+                         : std::vector<std::string>{"latitude = 9e999", "longitude = 'x'",
+                                                    "class_name = printf('%100000s', 'x')",
+                                                    "class_name = x'ff'", "life = x'00'"};
+    broken.insert(broken.end(), more.begin(), more.end());
+    return broken;
+  }
 
   std::vector<protocol::Report> reports_;
 };
 
 TEST_F(ZoneBrokenRowsTest, ABrokenHazardIsLeftOutAndCountedAndTheOthersStay) {
-  for (const char* broken : {"latitude = 91",
-                             "latitude = 9e999",
-                             "longitude = 'x'",
-                             "covariance_ee = -1",
-                             "covariance_en = 5",
-                             "covariance_nn = 1e300",
-                             "confidence = 1.5",
-                             "presence = -1",
-                             "class_name = ''",
-                             "class_name = printf('%100000s', 'x')",
-                             "class_name = x'ff'",
-                             "uuid = 'x'",
-                             "sightings = 0",
-                             "sightings = 4294967296",
-                             "first_seen_ns = -1",
-                             "last_seen_ns = 9223372036854775807",
-                             "sequence = 9223372036854775807",
-                             "announced_sequence = 99",
-                             "state = 7",
-                             "state = 2",
-                             "life = '1 2 3'",
-                             "life = x'00'",
-                             "image_sha256 = '../../etc/passwd'",
-                             "vehicles = -1"}) {
-    std::filesystem::remove_all(directory_ + "/zone");
+  for (const std::string& broken : BrokenHazards()) {
+    EmptyStore();
     reports_.clear();
     const std::vector<Uuid> hazards = MakeHazards();
-    Write(std::string("UPDATE hazards SET ") + broken + " WHERE id = 2");
+    Write("UPDATE hazards SET " + broken + " WHERE id = 2");
     ZoneService zone(Config(), Clock(), 2);
     EXPECT_TRUE(zone.Find(hazards[0])) << broken;
     EXPECT_FALSE(zone.Find(hazards[1])) << broken;
@@ -77,18 +87,21 @@ TEST_F(ZoneBrokenRowsTest, TheNewestRowsMayBeTheBrokenOnes) {
   ZoneService zone(Config(), Clock(), 2);
   EXPECT_EQ(zone.Sequence(), 2U);
   zone.Handle(MakeReport({50, 1}));
-  SqliteDatabase database(DatabasePath(), true);
-  SqliteStatement row = database.Prepare("SELECT latitude FROM hazards WHERE id = 3");
-  ASSERT_TRUE(row.Step());
-  EXPECT_EQ(row.Real(0), 100) << "what was there is there";
+  EXPECT_EQ(Probe().Number("SELECT latitude FROM hazards WHERE id = 3"), 100)
+      << "what was there is there";
 }
 
 TEST_F(ZoneBrokenRowsTest, BrokenEventsLivesTrustAndPlacesAreLeftOut) {
   const std::vector<Uuid> hazards = MakeHazards();
+  const std::string infinity = IsOnPostgresql() ? "'Infinity'" : "9e999";
   Write(
       "UPDATE events SET to_state = 9 WHERE sequence = 1;"
-      "UPDATE places SET latitude = 9e999;"
-      "INSERT INTO lives VALUES ('pothole', -1, 1), ('deer', 9e999, 0);"
+      "UPDATE places SET latitude = " +
+      infinity +
+      ";"
+      "INSERT INTO lives VALUES ('pothole', -1, 1), ('deer', " +
+      infinity +
+      ", 0);"
       "INSERT INTO trust VALUES (1, -1, 0, ''), (2, 1, 0, 'x'), (3, 1, -5, '0 0 0 0 0 0 0 0 0')");
   ZoneService zone(Config(), Clock(), 2);
   EXPECT_TRUE(zone.Events(hazards[0], 10).empty());
@@ -104,6 +117,7 @@ TEST_F(ZoneBrokenRowsTest, ASchemaThatNoProgramWroteIsRefused) {
 }
 
 TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchemas) {
+  SKIP_ON_POSTGRESQL();
   ZoneService::Config config = Config();
   config.catalogue = protocol::HazardCatalogue();
   const auto invent = [&](ZoneService& zone, double latitude_deg) {
@@ -144,7 +158,7 @@ TEST_F(ZoneBrokenRowsTest, WhatIsHeldAgainstVehiclesOutlivesARestartAndOldSchema
 TEST_F(ZoneBrokenRowsTest, AFailedRejectionIsHeldAgainstNobody) {
   ZoneService zone(Config(), Clock(), 1);
   const Uuid hazard = zone.Handle(MakeReport({1, 1})).hazard_uuid;
-  Write("CREATE TRIGGER no_space BEFORE INSERT ON trust BEGIN SELECT RAISE(ABORT, 'full'); END");
+  Probe().Refuse("INSERT", "trust", "full");
   for (int i = 0; i < 5; ++i) EXPECT_THROW(zone.Reject(hazard, "Anna", ""), StoreError);
   EXPECT_EQ(zone.Statistics().suspect_vehicles, 0U);
 }

@@ -9,7 +9,6 @@
 #include <memory>
 #include <set>
 
-#include "common/sqlite.h"
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 #include "zone/store/zone_store.h"
@@ -37,11 +36,9 @@ TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
   const Hazard before = *zone.Find(known);
   int events = 0;
   const int id = zone.Subscribe([&](const ZoneEvent&) { ++events; });
-  SqliteDatabase saboteur(DatabasePath(), true);
+  StoreProbe saboteur = Probe();
   // Fails on the second event, when hazards and reports have been written.
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE INSERT ON events WHEN NEW.sequence = 3 "
-      "BEGIN SELECT RAISE(ABORT, 'no space left'); END");
+  saboteur.Refuse("INSERT", "events", "no space left", "NEW.sequence = 3");
   const std::vector<protocol::Report> batch{MakeReport({1, 1}), MakeReport({2, 2})};
   try {
     zone.HandleBatch(batch);
@@ -54,7 +51,7 @@ TEST_F(ZoneDurabilityTest, ARefusedCommitLeavesMapAndStoreAsTheyWere) {
   EXPECT_EQ(zone.Sequence(), 1U);
   EXPECT_EQ(events, 0);
 
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("events");
   for (const protocol::Receipt& receipt : zone.HandleBatch(batch)) {
     EXPECT_EQ(receipt.status, protocol::Receipt::Status::kCommitted);
   }
@@ -102,30 +99,29 @@ TEST_F(ZoneDurabilityTest, NothingCommittedIsLostOrDoubledWhenTheProcessIsKilled
     ASSERT_EQ(waitpid(child, &status, 0), child);
     ASSERT_TRUE(WIFSIGNALED(status));
 
-    ZoneStore store(DatabasePath());
+    ZoneStore store(Database());
     for (const Uuid& committed : uuids) EXPECT_TRUE(store.FindReport(committed));
     acknowledged += uuids.size();
-    SqliteDatabase database(DatabasePath(), true);
-    SqliteStatement sum = database.Prepare(
-        "SELECT (SELECT sum(sightings) FROM hazards), (SELECT count(*) FROM reports), "
-        "(SELECT count(*) FROM events)");
-    ASSERT_TRUE(sum.Step());
-    EXPECT_EQ(sum.Int(0), sum.Int(1));
-    EXPECT_EQ(sum.Int(1), sum.Int(2));
+    StoreProbe probe = Probe();
+    const double reports = probe.Number("SELECT count(*) FROM reports");
+    EXPECT_EQ(probe.Number("SELECT sum(sightings) FROM hazards"), reports);
+    EXPECT_EQ(probe.Number("SELECT count(*) FROM events"), reports);
     // At most one report per kill was committed without anybody hearing of it.
-    EXPECT_LE(sum.Int(1), static_cast<std::int64_t>(acknowledged) + round + 1);
+    EXPECT_LE(reports, static_cast<double>(acknowledged) + round + 1);
   }
   ZoneService zone(Config(), Clock(), 77);
   EXPECT_EQ(zone.Handle(MakeReport({40.0, 8.0})).status, protocol::Receipt::Status::kCommitted);
 }
 
 TEST_F(ZoneDurabilityTest, RefusesAFileThatIsNoDatabase) {
+  SKIP_ON_POSTGRESQL();
   std::filesystem::create_directories(directory_ + "/zone");
   std::ofstream(DatabasePath()) << std::string(5000, 'x');
   EXPECT_THAT(WhyNotOpened(), testing::AllOf(HasSubstr(DatabasePath()), HasSubstr("database")));
 }
 
 TEST_F(ZoneDurabilityTest, RefusesADamagedDatabase) {
+  SKIP_ON_POSTGRESQL();
   {
     ZoneService zone(Config(), Clock(), 1);
     std::vector<protocol::Report> reports;
@@ -141,7 +137,7 @@ TEST_F(ZoneDurabilityTest, RefusesADamagedDatabase) {
 
 TEST_F(ZoneDurabilityTest, RefusesASchemaNewerThanItself) {
   { ZoneService zone(Config(), Clock(), 1); }
-  SqliteDatabase(DatabasePath(), true).Execute("INSERT INTO livemap_schema VALUES (99)");
+  Probe().Execute("INSERT INTO livemap_schema VALUES (99)");
   EXPECT_THAT(WhyNotOpened(), testing::AllOf(HasSubstr("99"), HasSubstr("version")));
 }
 
@@ -156,6 +152,7 @@ TEST_F(ZoneDurabilityTest, RefusesADirectoryThatCannotBeMade) {
 }
 
 TEST_F(ZoneDurabilityTest, WorksInADirectoryWithBlanksAndQuotes) {
+  SKIP_ON_POSTGRESQL();
   ZoneService::Config config = Config();
   config.directory = directory_ + "/a zone's; directory=x";
   { ZoneService(config, Clock(), 1).Handle(MakeReport()); }

@@ -59,6 +59,7 @@ class FullDisk {
 };
 
 TEST_F(ZoneStoreTest, AFullDiskRefusesNewWorkAndDamagesNothingAccepted) {
+  SKIP_ON_POSTGRESQL();
   std::vector<protocol::Report> reports;
   for (int i = 0; i < 400; ++i) reports.push_back(MakeReport({40 + 0.001 * i, 8}));
   std::string before;
@@ -93,9 +94,8 @@ TEST_F(ZoneStoreTest, AFailedDecisionLeavesMemoryAndStoreAsTheyWere) {
       config, [&] { return now_ns; }, 1);
   const Uuid hazard = zone.Handle(MakeReport({1, 1})).hazard_uuid;
   const std::string before = Everything(zone);
-  SqliteDatabase saboteur(DatabasePath(), true);
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE UPDATE ON hazards BEGIN SELECT RAISE(ABORT, 'full'); END");
+  StoreProbe saboteur = Probe();
+  saboteur.Refuse("UPDATE", "hazards", "full");
   EXPECT_THROW(zone.Reject(hazard, "Anna", "why"), StoreError);
   EXPECT_THROW(zone.Confirm(hazard, "Anna"), StoreError);
   EXPECT_THROW(zone.Distrust("car-1", "Anna", "why"), StoreError);
@@ -104,7 +104,7 @@ TEST_F(ZoneStoreTest, AFailedDecisionLeavesMemoryAndStoreAsTheyWere) {
   now_ns += 400 * 86400'000'000'000;
   EXPECT_THROW(zone.Advance(), StoreError);
   EXPECT_EQ(Everything(zone), before);
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("hazards");
   // What was due is due still.
   zone.Advance();
   EXPECT_FALSE(IsOnMap(zone.Find(hazard)->state));
@@ -116,12 +116,7 @@ TEST_F(ZoneStoreTest, WhatWasLearnedOfAClassIsCommittedWithTheReportOrForgotten)
   ZoneService zone(
       Config(), [&] { return now_ns; }, 1);
   const auto learned = [this] {
-    SqliteDatabase database(DatabasePath(), true);
-    SqliteStatement query = database.Prepare("SELECT coalesce(sum(stood_s), 0) FROM lives");
-    query.Step();
-    const double stood_s = query.Real(0);
-    query.Step();
-    return stood_s;
+    return Probe().Number("SELECT coalesce(sum(stood_s), 0) FROM lives");
   };
   zone.Handle(MakeReport({1, 1}));
   const auto sighting = [&](const std::string& vehicle) {
@@ -134,12 +129,11 @@ TEST_F(ZoneStoreTest, WhatWasLearnedOfAClassIsCommittedWithTheReportOrForgotten)
   zone.Handle(sighting("car-2"));
   const double before_s = learned();
   EXPECT_NEAR(before_s, 1000, 2);
-  SqliteDatabase saboteur(DatabasePath(), true);
-  saboteur.Execute(
-      "CREATE TRIGGER no_space BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  StoreProbe saboteur = Probe();
+  saboteur.Refuse("INSERT", "events", "full");
   now_ns += 1000'000'000'000;
   for (int i = 0; i < 3; ++i) EXPECT_THROW(zone.Handle(sighting("car-3")), StoreError);
-  saboteur.Execute("DROP TRIGGER no_space");
+  saboteur.Accept("events");
   EXPECT_EQ(learned(), before_s);
   zone.Handle(sighting("car-3"));
   EXPECT_NEAR(learned(), 2000, 3);
@@ -187,6 +181,7 @@ constexpr char kVersion1[] = R"(
 )";
 
 TEST_F(ZoneStoreTest, ADatabaseOfTheFirstVersionIsBroughtUpToDateWithAllItHolds) {
+  SKIP_ON_POSTGRESQL();
   std::filesystem::create_directories(directory_ + "/zone");
   SqliteDatabase(DatabasePath(), true).Execute(kVersion1);
   for (int start = 0; start < 2; ++start) {
@@ -221,6 +216,7 @@ TEST_F(ZoneStoreTest, ADatabaseOfTheFirstVersionIsBroughtUpToDateWithAllItHolds)
 }
 
 TEST_F(ZoneStoreTest, ACorruptStoreIsLeftAloneAndItsContentRecoverable) {
+  SKIP_ON_POSTGRESQL();
   if (std::system("command -v sqlite3 > /dev/null") != 0) {
     GTEST_SKIP() << "skipped, no sqlite3";
   }

@@ -1,0 +1,214 @@
+// What a server of PostgreSQL can do to a zone that a file cannot: go away in the middle, be used
+// by others, and be set up so that it forgets.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/error.h"
+#include "common/sqlite.h"
+#include "test/zone/zone_fixture.h"
+#include "zone/service/zone_service.h"
+#include "zone/store/postgresql_url.h"
+
+namespace livemap::zone {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// With a server of its own, which a test may kill.
+class PostgresqlStoreTest : public ZoneTest {
+ protected:
+  void SetUp() override {
+    if (!test::PostgresqlServer::IsInstalled()) {
+      GTEST_SKIP() << "skipped, no PostgreSQL server installed";
+    }
+    server_ = std::make_unique<test::PostgresqlServer>();
+    url_ = server_->MakeDatabase();
+  }
+  ZoneService::Config OnServer(const std::string& name = "zone") const {
+    ZoneService::Config config = Config();
+    config.directory = directory_ + "/" + name;
+    config.store_url = url_;
+    return config;
+  }
+  std::string WhyNotStarted(const ZoneService::Config& config) const {
+    try {
+      ZoneService(config, Clock(), 9);
+    } catch (const StoreError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  /// The hazards' sightings are those of the reports, and each report has its event.
+  void ExpectConsistent(double reports) {
+    StoreProbe probe(url_);
+    EXPECT_EQ(probe.Number("SELECT count(*) FROM reports"), reports);
+    EXPECT_EQ(probe.Number("SELECT sum(sightings) FROM hazards"), reports);
+    EXPECT_EQ(probe.Number("SELECT count(*) FROM events"), reports);
+  }
+
+  std::unique_ptr<test::PostgresqlServer> server_;
+  std::string url_;
+};
+
+/// As a vehicle does: the same report again until it is answered. How often it was refused.
+int HandleUntilCommitted(ZoneService& zone, const protocol::Report& report) {
+  std::string why;
+  for (int failed = 0; failed < 300; ++failed) {
+    try {
+      EXPECT_EQ(zone.Handle(report).status, protocol::Receipt::Status::kCommitted);
+      return failed;
+    } catch (const StoreError& error) {
+      why = error.what();
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+  }
+  ADD_FAILURE() << "never committed: " << why;
+  return 300;
+}
+
+std::string WhyUrlRefused(const std::string& url) {
+  try {
+    CheckedPostgresqlUrl(url);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(PostgresqlUrlTest, AUrlGetsAnEndToWaitingUnlessItNamesOne) {
+  EXPECT_EQ(CheckedPostgresqlUrl("postgresql://zone@db.example.org/livemap?connect_timeout=9"),
+            "postgresql://zone@db.example.org/livemap?connect_timeout=9&application_name=livemap"
+            "&tcp_user_timeout=20000");
+  EXPECT_THAT(CheckedPostgresqlUrl("postgres:///livemap"), HasSubstr("?connect_timeout=5"));
+}
+
+TEST(PostgresqlUrlTest, APasswordInAUrlIsRefusedAndNotRepeated) {
+  for (const char* url : {"postgresql://zone:hunter2@db.example.org/livemap",
+                          "postgresql://zone@db.example.org/livemap?password=hunter2"}) {
+    EXPECT_THAT(WhyUrlRefused(url),
+                AllOf(HasSubstr("password"), HasSubstr(".pgpass"), Not(HasSubstr("hunter2"))));
+  }
+}
+
+TEST(PostgresqlUrlTest, WhatIsNoUrlOfADatabaseIsRefusedWithWhatIsAccepted) {
+  for (const char* url :
+       {"", "mysql://zone@host/livemap", "host=db dbname=livemap", "postgresql://zone@host",
+        "postgresql://zone@host/live map", "postgresql://zone@host/livemap\n"}) {
+    EXPECT_THAT(WhyUrlRefused(url), HasSubstr("accepted is postgresql://")) << url;
+  }
+  EXPECT_THAT(WhyUrlRefused("postgresql://host/livemap?colour=red"), HasSubstr("colour"));
+}
+
+TEST_F(PostgresqlStoreTest, NothingCommittedIsLostOrDoubledWhenTheServerIsKilled) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  std::vector<protocol::Report> reports;
+  for (int round = 0; round < 4; ++round) {
+    std::thread committer([&] {
+      int failed = 0;
+      // Until the server was killed and is back.
+      for (int i = 0; i < 40 || failed == 0; ++i) {
+        reports.push_back(MakeReport({40 + 0.001 * (i % 50), 8}));
+        failed += HandleUntilCommitted(zone, reports.back());
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(30 + 40 * round));
+    server_->Kill(SIGKILL);
+    server_->Start();
+    committer.join();
+  }
+  ExpectConsistent(static_cast<double>(reports.size()));
+  for (const protocol::Report& report : reports) {
+    EXPECT_EQ(zone.Handle(report).status, protocol::Receipt::Status::kCommitted);
+  }
+  EXPECT_EQ(zone.Statistics().repeated, reports.size()) << "each was there, once";
+}
+
+TEST_F(PostgresqlStoreTest, ACommitWhoseAnswerWasLostCountsWhenItCameToPass) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  zone.Handle(MakeReport({1, 1}));
+  // From now on a commit is on the disk, but the server answers only when a standby has it, too.
+  StoreProbe(url_).Execute("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
+  StoreProbe(url_).Execute("SELECT pg_reload_conf()");
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  const protocol::Report report = MakeReport({1, 1});
+  std::atomic<bool> is_committed{false};
+  std::thread writer(
+      [&] { is_committed = zone.Handle(report).status == protocol::Receipt::Status::kCommitted; });
+  StoreProbe probe(url_);
+  while (probe.Number("SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  server_->Kill(SIGKILL);
+  server_->Start("-c synchronous_standby_names=");
+  writer.join();
+  EXPECT_TRUE(is_committed);
+  zone.Handle(MakeReport({1, 1}));
+  EXPECT_EQ(zone.Statistics().store_errors, 0U);
+  ExpectConsistent(3);
+}
+
+TEST_F(PostgresqlStoreTest, AHistoryIsReadAgainAfterTheServerWasKilled) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  const Uuid hazard = zone.Handle(MakeReport()).hazard_uuid;
+  server_->Kill(SIGKILL);
+  EXPECT_THROW(zone.Events(hazard, 10), StoreError);
+  EXPECT_TRUE(zone.Find(hazard)) << "what is in memory is told meanwhile";
+  server_->Start();
+  EXPECT_EQ(zone.Events(hazard, 10).size(), 1U);
+}
+
+TEST_F(PostgresqlStoreTest, ADatabaseThatAnotherZoneHasIsRefused) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  EXPECT_THAT(WhyNotStarted(OnServer("other")), AllOf(HasSubstr("in use"), HasSubstr(url_)));
+  zone.Handle(MakeReport());
+  ExpectConsistent(1);
+}
+
+TEST_F(PostgresqlStoreTest, AZoneWhoseDatabaseAnotherOneHadMeanwhileWritesNoMore) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  zone.Handle(MakeReport());
+  StoreProbe(url_).Execute(
+      "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()");
+  { ZoneService(OnServer("other"), Clock(), 2).Handle(MakeReport()); }
+  for (int i = 0; i < 2; ++i) {
+    try {
+      zone.Handle(MakeReport());
+      FAIL() << "its memory is not what the database holds";
+    } catch (const StoreError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("another zone"));
+    }
+  }
+  ExpectConsistent(2);
+}
+
+TEST_F(PostgresqlStoreTest, AServerThatDoesNotWaitForItsDiskIsRefused) {
+  server_->Kill(SIGTERM);
+  server_->Start("-c fsync=off");
+  EXPECT_THAT(WhyNotStarted(OnServer()), HasSubstr("fsync"));
+}
+
+TEST_F(PostgresqlStoreTest, ADatabaseOfAnotherEncodingIsRefused) {
+  StoreProbe(server_->Url("postgres"))
+      .Execute("CREATE DATABASE latin ENCODING 'LATIN1' LOCALE 'C' TEMPLATE template0");
+  url_ = server_->Url("latin");
+  EXPECT_THAT(WhyNotStarted(OnServer()), AllOf(HasSubstr("LATIN1"), HasSubstr("UTF8")));
+}
+
+TEST_F(PostgresqlStoreTest, AZoneWithAnAddressThatNobodyServesDoesNotStart) {
+  url_ = "postgresql://livemap@/zone?host=" + directory_;
+  EXPECT_THAT(WhyNotStarted(OnServer()), AllOf(HasSubstr("opening"), HasSubstr(directory_)));
+}
+
+}  // namespace
+}  // namespace livemap::zone
