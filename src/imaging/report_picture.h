@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "imaging/box.h"
+#include "imaging/picture_marks.h"
+
 namespace livemap::imaging {
 
 /// An image that others own: `owner` keeps the pixels alive, so that nothing is copied.
@@ -36,7 +38,9 @@ struct CropConfig {
 constexpr int kLegibleSidePx = 32;
 /// ...and no lower JPEG quality than this.
 constexpr int kLegibleQuality = 40;
-constexpr int kMinCropPx = 240;  ///< Width of the part that is shown, with all its surroundings.
+/// Width of the part that is shown with all its surroundings, where the image has as much: so much
+/// a person needs to judge by it.
+constexpr int kMinCropPx = 480;
 
 /// A hazard's picture and what of the original image it shows.
 struct CroppedPicture {
@@ -55,7 +59,9 @@ PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& 
 /// bytes do not allow is given up in this order: quality down to kLegibleQuality, pixels down to
 /// kLegibleSidePx of the box, surroundings down to one and a half times the box. A budget that
 /// even this exceeds gives a picture that is not legible, or none. Also none where there is no
-/// picture, as for EncodeJpeg. A box that does not meet the image shows the whole of it.
-CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config);
+/// picture, as for EncodeJpeg. A box that does not meet the image shows the whole of it. The marks
+/// are drawn into the picture alone, once it has its size; null: none are.
+CroppedPicture CropPicture(const Picture& picture, const Box& box, const CropConfig& config,
+                           const PictureMarks* marks = nullptr);
 
 }  // namespace livemap::imaging

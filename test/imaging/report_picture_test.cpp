@@ -128,16 +128,45 @@ std::string WhyNotLegible(const CroppedPicture& cropped, const Picture& picture,
 TEST(CropPicture, ShowsTheBoxAndItsSurroundingsInTheirOwnPixels) {
   const CroppedPicture cropped = CropPicture(Road(), kPothole, {});
   EXPECT_TRUE(cropped.legible);
-  // 240 pixels wide at least, 3 to 2, the box in the middle.
-  EXPECT_EQ(cropped.shown.width, 240u);
-  EXPECT_EQ(cropped.shown.height, 160u);
-  EXPECT_NEAR(cropped.shown.x + 120.0, 330, 1);
-  EXPECT_NEAR(cropped.shown.y + 80.0, 265, 1);
+  // 480 pixels wide at least, 3 to 2, the box in the middle as far as the image goes.
+  EXPECT_EQ(cropped.shown.width, 480u);
+  EXPECT_EQ(cropped.shown.height, 320u);
+  EXPECT_NEAR(cropped.shown.x + 240.0, 330, 1);
+  EXPECT_EQ(cropped.shown.y, 80u);
   const cv::Mat seen = cv::imdecode(cropped.jpeg, cv::IMREAD_COLOR);
-  ASSERT_EQ(seen.size(), cv::Size(240, 160));
-  const cv::Rect part(static_cast<int>(cropped.shown.x), static_cast<int>(cropped.shown.y), 240,
-                      160);
+  ASSERT_EQ(seen.size(), cv::Size(480, 320));
+  EXPECT_LE(cropped.jpeg.size(), CropConfig().max_bytes);
+  const cv::Rect part(static_cast<int>(cropped.shown.x), static_cast<int>(cropped.shown.y), 480,
+                      320);
   EXPECT_GT(cv::PSNR(seen, Road().bgr(part)), 25) << "the same pixels";
+}
+
+TEST(CropPicture, AnImageThatIsSmallerIsShownAsWideAsItIs) {
+  const Picture small{cv::Mat(200, 320, CV_8UC3, cv::Scalar(110, 112, 115)), nullptr};
+  const CroppedPicture cropped = CropPicture(small, {100, 100, 140, 130}, {});
+  EXPECT_EQ(cropped.shown.width, 320u);
+  EXPECT_EQ(cropped.shown.height, 200u);
+  EXPECT_EQ(cropped.scale, 1);
+}
+
+TEST(CropPicture, TheMarksAreDrawnIntoThePictureAloneAtItsOwnSize) {
+  const Picture road = Road();
+  const cv::Mat before = road.bgr.clone();
+  const PictureMarks marks{kPothole, "pothole 0.83", {}};
+  for (const std::size_t max_bytes : {12000u, 5000u}) {
+    const CroppedPicture plain = CropPicture(road, kPothole, {max_bytes, 80, 3.0});
+    const CroppedPicture marked = CropPicture(road, kPothole, {max_bytes, 80, 3.0}, &marks);
+    EXPECT_LE(marked.jpeg.size(), max_bytes);
+    const cv::Mat seen = cv::imdecode(marked.jpeg, cv::IMREAD_COLOR);
+    const auto pixel = [&marked](double at, std::uint32_t begin) {
+      return cvRound((at - begin) * marked.scale);
+    };
+    const cv::Point left(pixel(kPothole.x_min, marked.shown.x), pixel(265, marked.shown.y));
+    const cv::Vec3b line = seen.at<cv::Vec3b>(left);
+    EXPECT_GT(line[2], line[0] + 50) << "the left edge is red in " << max_bytes << " bytes";
+    EXPECT_NE(marked.jpeg, plain.jpeg);
+  }
+  EXPECT_EQ(cv::norm(before, road.bgr, cv::NORM_INF), 0) << "others look at the image";
 }
 
 TEST(CropPicture, KeepsTheBoxLegibleWithinTheBytesWhereverItLies) {
@@ -201,7 +230,7 @@ TEST(CropPicture, EveryPotholeOfARealRoadIsLegibleInTwelveKilobytes) {
       set != nullptr ? set : std::string(LIVEMAP_SOURCE_DIR) + "/../shared/data";
   const auto section = data / "road_survey" / "386RS169832";
   if (!std::filesystem::is_directory(section)) GTEST_SKIP() << "skipped, no data";
-  std::size_t pictures = 0, bytes = 0, reduced = 0;
+  std::size_t pictures = 0, bytes = 0, reduced = 0, narrow = 0;
   for (const auto& entry : std::filesystem::directory_iterator(section / "labels")) {
     std::filesystem::path photo = section / "images" / entry.path().filename();
     photo.replace_extension(".jpg");
@@ -214,11 +243,14 @@ TEST(CropPicture, EveryPotholeOfARealRoadIsLegibleInTwelveKilobytes) {
       ++pictures;
       bytes += cropped.jpeg.size();
       if (cropped.scale < 1 || cropped.quality < 60) ++reduced;
+      if (cropped.shown.width * cropped.scale < kMinCropPx - 0.5) ++narrow;
     }
   }
   ASSERT_GT(pictures, 20u);
+  EXPECT_LE(narrow, pictures / 20) << "a person judges by 480 pixels";
   std::cout << pictures << " potholes, mean " << bytes / pictures << " bytes, " << reduced
-            << " of them below quality 60 or reduced\n";
+            << " of them below quality 60 or reduced, " << narrow << " narrower than " << kMinCropPx
+            << " pixels\n";
 }
 
 }  // namespace

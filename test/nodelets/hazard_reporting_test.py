@@ -82,10 +82,10 @@ class HazardReportingTest(unittest.TestCase):
         self.assertEqual(report.image.header.frame_id, OPTICAL)
         self.assertEqual((report.image_width, report.image_height), (640, 400))
         # What it shows: the hazard and its surroundings, in few bytes.
-        self.assertEqual(decode(report.image).shape, (160, 240, 3))
-        self.assertEqual((report.shown_width, report.shown_height), (240, 160))
-        self.assertTrue(report.shown_x <= report.x_min and report.x_max <= report.shown_x + 240)
-        self.assertTrue(report.shown_y <= report.y_min and report.y_max <= report.shown_y + 160)
+        self.assertEqual(decode(report.image).shape, (320, 480, 3))
+        self.assertEqual((report.shown_width, report.shown_height), (480, 320))
+        self.assertTrue(report.shown_x <= report.x_min and report.x_max <= report.shown_x + 480)
+        self.assertTrue(report.shown_y <= report.y_min and report.y_max <= report.shown_y + 320)
         self.assertLessEqual(len(report.image.data), 12000)
         self.assertGreater(report.covariance[0] * report.covariance[3], report.covariance[1] ** 2)
 
@@ -166,7 +166,7 @@ class HazardReportingTest(unittest.TestCase):
         deferred = eventually(lambda: [report for report in vehicle.reports() if report.class_name == "pothole"],
                               "it goes")[0]
         self.assertEqual(deferred.stamp, stamp(3.1))
-        self.assertEqual(decode(deferred.image).shape, (160, 240, 3))
+        self.assertEqual(decode(deferred.image).shape, (320, 480, 3))
         vehicle.publish("hazard/receipt", receipt(deferred, hazard=8))
         vehicle.wait_for(pending=0, held=0, committed=1, reports_sent=1)
         count = len(vehicle.reports())
@@ -264,7 +264,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.see(3.05, detection(11.2))
         answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
         self.assertLessEqual(len(answer.image.data), 12000)
-        self.assertEqual(decode(answer.image).shape, (160, 240, 3))
+        self.assertEqual(decode(answer.image).shape, (320, 480, 3))
 
     def test_says_when_it_was_too_dark_to_see(self):
         vehicle = self.driving_vehicle(poll_reserve_s=0.5)

@@ -19,9 +19,8 @@
 #include "nodelets/diagnostics.h"
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
-#include "perception/detection/annotation.h"
+#include "placement/sighting.h"
 #include "protocol/hazard_catalogue.h"
-#include "ros/conversions/detection_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/offload_conversions.h"
 #include "ros/parameters/candidate_intake_parameters.h"
@@ -127,7 +126,7 @@ class CandidateIntakePart : public NodeletPart {
     std::vector<protocol::Report> reports = intake_->Finish(answer.stamp_ns, answer);
     const auto picture = pictures_.find(answer.stamp_ns);
     if (!reports.empty() && picture != pictures_.end()) {
-      AddPicture(*picture->second, ros_io::ToDetections(message), reports);
+      AddPicture(*picture->second, answer, reports);
     }
     if (picture != pictures_.end()) pictures_.erase(picture);
     for (const protocol::Report& report : reports) {
@@ -136,18 +135,20 @@ class CandidateIntakePart : public NodeletPart {
     Work();
   }
 
-  /// The picture that a big vehicle would have sent: with all boxes of the frame.
-  void AddPicture(const sensor_msgs::Image& image,
-                  const std::vector<perception::HazardDetection>& detections,
+  /// The picture that a big vehicle would have sent, with the same marks.
+  void AddPicture(const sensor_msgs::Image& image, const placement::SightingFrame& found,
                   std::vector<protocol::Report>& reports) {
-    cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
+    const cv::Mat bgr = cv_bridge::toCvCopy(image, sensor_msgs::image_encodings::BGR8)->image;
     const imaging::Picture picture{bgr, nullptr};
-    perception::AnnotateImage(bgr, detections);
+    imaging::PictureMarks marks;
+    for (const placement::Sighting& each : found.sightings) marks.others.push_back(each.box);
     imaging::CropConfig crop;
     crop.max_bytes = static_cast<std::size_t>(config_.max_image_bytes);
     crop.quality = config_.jpeg_quality;
     for (protocol::Report& report : reports) {
-      imaging::CroppedPicture cropped = imaging::CropPicture(picture, report.box, crop);
+      marks.subject = report.box;
+      marks.label = imaging::MarkLabel(report.class_name, report.confidence);
+      imaging::CroppedPicture cropped = imaging::CropPicture(picture, report.box, crop, &marks);
       if (cropped.jpeg.empty()) continue;
       report.image_format = "jpeg";
       report.image = std::move(cropped.jpeg);

@@ -6,8 +6,6 @@
 #include <utility>
 
 #include "nodelets/nodelet_support.h"
-#include "perception/detection/annotation.h"
-#include "placement/road_ground_contact.h"
 
 namespace livemap::nodelets {
 namespace {
@@ -23,18 +21,6 @@ cv::Rect PixelsOf(const imaging::Box& box, const cv::Size& image) {
   const cv::Point end(cvCeil(within(box.x_max, image.width)),
                       cvCeil(within(box.y_max, image.height)));
   return {first, end};
-}
-
-/// Those that can be drawn; anybody may publish detections.
-std::vector<perception::HazardDetection> ToDetections(
-    const std::vector<placement::Sighting>& sightings, const cv::Size& image) {
-  std::vector<perception::HazardDetection> detections;
-  for (const placement::Sighting& each : sightings) {
-    if (!placement::IsWellFormed(each)) continue;
-    const cv::Rect pixels = PixelsOf(each.box, image);
-    if (!pixels.empty()) detections.push_back({each.class_name, 0, each.confidence, pixels});
-  }
-  return detections;
 }
 
 /// The part of `bgr` in whole pixels.
@@ -56,19 +42,14 @@ std::vector<imaging::CroppedPicture> PictureMaker::Make(const vehicle::PictureOr
   for (const vehicle::PictureOrder::Cut& cut : order.cuts) {
     subjects.push_back(PixelsOf(cut.subject, bgr.size()));
   }
-  perception::PictureMasker::Masked masked =
+  const perception::PictureMasker::Masked masked =
       masker_.Mask(bgr, order.image.number, ToRect(vehicle::VisibleRegion(order), bgr), subjects);
   if (masked.bgr.empty()) {
     ROS_ERROR_THROTTLE(kSayAgainS, "%s: a picture is withheld: %s", log_name_.c_str(),
                        masked.why_withheld.c_str());
     return {};
   }
-  // Without privacy these are the camera's pixels, which others look at.
-  if (masked.bgr.data == bgr.data) masked.bgr = bgr.clone();
-  if (draws_boxes_) {
-    perception::AnnotateImage(masked.bgr, ToDetections(order.image.sightings, bgr.size()));
-  }
-  return vehicle::CutPictures(order, masked.bgr);
+  return vehicle::CutPictures(order, masked.bgr, draws_boxes_);
 }
 
 }  // namespace livemap::nodelets

@@ -11,7 +11,7 @@
 namespace livemap::nodelets {
 
 /// Makes the pictures of reports and answers of the camera's images: faces and number plates are
-/// masked, then the boxes are drawn, then the parts are cut out and encoded. It fails closed: an
+/// masked, then the parts are cut out, marked with boxes and encoded. It fails closed: an
 /// image that cannot be masked makes no picture. Thread-safe, one Make at a time.
 ///
 /// Typical usage: CountFrame for every image of the camera, whose number goes with the image

@@ -29,15 +29,6 @@ DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detecti
   return message;
 }
 
-std::vector<perception::HazardDetection> ToDetections(const DetectionArray& message) {
-  std::vector<perception::HazardDetection> detections;
-  for (const Detection& each : message.detections) {
-    const cv::Rect2f box(each.x_min, each.y_min, each.x_max - each.x_min, each.y_max - each.y_min);
-    detections.push_back({each.class_name, 0, each.confidence, box});
-  }
-  return detections;
-}
-
 sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,
                                          const std::vector<perception::HazardDetection>& detections,
                                          const std_msgs::Header& header) {

@@ -18,9 +18,6 @@ DetectionArray ToMessage(const std::vector<perception::HazardDetection>& detecti
                          const std_msgs::Header& header, const std::string& model,
                          cv::Size image_size, double inference_ms);
 
-/// What such a message tells; the places in the model's class list are not in it and are 0.
-std::vector<perception::HazardDetection> ToDetections(const DetectionArray& message);
-
 /// A bgr8 message of `bgr` with the detections drawn in, with the image's header: one copy of the
 /// pixels.
 sensor_msgs::ImagePtr ToAnnotatedMessage(const cv::Mat& bgr,

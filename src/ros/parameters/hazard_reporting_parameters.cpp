@@ -109,12 +109,14 @@ void ReadReportingPicture(ParameterReader& parameters, HazardReportingConfig& co
       "Size of the picture. Quality, then pixels, then surroundings are lowered to meet it.",
       "bytes");
   parameters.Read("picture_context", reporter.picture.context, {0, 100},
-                  "The picture shows this many times the box's sides, at least 240 x 160 pixels. "
+                  "The picture shows this many times the box's sides, at least 480 x 320 pixels. "
                   "0: the whole image.");
-  parameters.Read("draw_boxes", config.draw_boxes,
-                  "Draw the boxes of what was found into the pictures. false: they are plain, as "
-                  "training wants those of ./livemap zone export-labels; officials then see the "
-                  "hazard without its box.");
+  parameters.Read(
+      "draw_boxes", config.draw_boxes,
+      "Draw into each picture the box of the hazard that it is about, and faintly those "
+      "of what else was found. false: they are plain, as "
+      "training wants those of ./livemap zone export-labels; officials then see the "
+      "hazard without its box.");
   parameters.Section("Faces and number plates");
   ReadPrivacy(parameters, config.privacy, config.mask,
               "Mask faces and number plates in every picture of a report and of an answer. With "
@@ -244,6 +246,10 @@ void ReadReportingPolls(ParameterReader& parameters, HazardReportingConfig& conf
                   "Time before a poll expires at which its answer leaves at the latest.", "s");
   parameters.Read("poll_jpeg_quality", polls.jpeg_quality, {1, 100},
                   "JPEG quality of an answer's picture.");
+  parameters.Read("poll_frame_bytes", polls.max_frame_bytes, {0, 1e6},
+                  "Size of an answer's picture where the zone asks for the whole frame. The zone's "
+                  "own bound counts where that is smaller. 0: whole frames are not sent.",
+                  "bytes");
 }
 
 void ReadReportingViews(ParameterReader& parameters, HazardReportingConfig& config) {

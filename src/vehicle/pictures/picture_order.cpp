@@ -9,26 +9,23 @@ imaging::PixelRegion VisibleRegion(const PictureOrder& order) {
   std::optional<imaging::PixelRegion> shown;
   for (const PictureOrder::Cut& cut : order.cuts) {
     const imaging::PixelRegion part =
-        cut.is_whole_image ? imaging::PixelRegion{}
-                           : imaging::WidestCrop(cut.subject, bgr.cols, bgr.rows, cut.crop);
+        imaging::WidestCrop(cut.subject, bgr.cols, bgr.rows, cut.crop);
     shown = shown ? imaging::Union(*shown, part) : part;
   }
   return shown.value_or(imaging::PixelRegion{});
 }
 
 std::vector<imaging::CroppedPicture> CutPictures(const PictureOrder& order,
-                                                 const cv::Mat& masked_bgr) {
+                                                 const cv::Mat& masked_bgr, bool draws_boxes) {
+  const imaging::Picture masked{masked_bgr, nullptr};
+  imaging::PictureMarks marks;
+  for (const placement::Sighting& each : order.image.sightings) marks.others.push_back(each.box);
   std::vector<imaging::CroppedPicture> pictures;
   for (const PictureOrder::Cut& cut : order.cuts) {
-    const imaging::Picture masked{masked_bgr, nullptr};
-    if (cut.is_whole_image) {
-      imaging::CroppedPicture whole;
-      whole.jpeg = imaging::EncodeJpeg(masked, cut.crop.quality, cut.crop.max_bytes);
-      whole.legible = !whole.jpeg.empty();
-      pictures.push_back(std::move(whole));
-    } else {
-      pictures.push_back(imaging::CropPicture(masked, cut.subject, cut.crop));
-    }
+    marks.subject = cut.subject;
+    marks.label = cut.label;
+    pictures.push_back(
+        imaging::CropPicture(masked, cut.subject, cut.crop, draws_boxes ? &marks : nullptr));
   }
   return pictures;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -25,9 +26,9 @@ struct CameraImage {
 struct PictureOrder {
   /// One picture, cut out of the masked image.
   struct Cut {
-    imaging::Box subject;         ///< What the picture is about, px; without area the whole image.
-    imaging::CropConfig crop;     ///< How much of its surroundings, in how many bytes.
-    bool is_whole_image = false;  ///< All of the image is shown, whatever `crop.context` says.
+    imaging::Box subject;      ///< What the picture is about, px; without area the whole image.
+    imaging::CropConfig crop;  ///< How much of its surroundings, in how many bytes.
+    std::string label;         ///< What is written at the subject's box.
   };
 
   /// By which the orderer knows the answer.
@@ -40,8 +41,9 @@ struct PictureOrder {
 imaging::PixelRegion VisibleRegion(const PictureOrder& order);
 
 /// The pictures of `order` out of its image once that may leave the vehicle: one for each cut, in
-/// their order. A cut whose bytes do not suffice has an empty picture.
+/// their order. With `draws_boxes` the cut's subject is marked loudly, and what else the detector
+/// found faintly. A cut whose bytes do not suffice has an empty picture.
 std::vector<imaging::CroppedPicture> CutPictures(const PictureOrder& order,
-                                                 const cv::Mat& masked_bgr);
+                                                 const cv::Mat& masked_bgr, bool draws_boxes);
 
 }  // namespace livemap::vehicle

@@ -167,9 +167,13 @@ void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
       placement::ProjectPlace(open.poll.position, open.poll.covariance_m2, camera,
                               config_.projection, config_.margin_share);
   if (const placement::Sighting* match = Match(open, frame, view, camera)) {
-    open.matched_s = steady_s;
+    open.is_seen = true;
     open.match_confidence = match->confidence;
     SetView(open, frame, camera.base, match->box, vehicle);
+    // From afar a whole frame shows nothing that a person could judge by.
+    const bool is_far = open.poll.picture == protocol::PollPicture::kFullFrame &&
+                        view.distance_m > config_.max_range_m;
+    if (!is_far) open.matched_s = steady_s;
     return;
   }
   const auto trouble = WhyNotClear(view, frame);
@@ -179,7 +183,7 @@ void PollResponder::Look(OpenPoll& open, const placement::SightingFrame& frame,
   }
   ++open.troubles[*trouble];
   // The place has left the view: nearer images will not come.
-  const bool left = *trouble == Trouble::kOutside && IsGone(open);
+  const bool left = *trouble == Trouble::kOutside && MayStand(open);
   if (left) open.no_stands_s = std::min(open.no_stands_s, steady_s);
 }
 
@@ -248,11 +252,18 @@ bool PollResponder::IsGone(const OpenPoll& open) const {
   return open.clear_views >= (open.vanished > 0 ? 1 : config_.no_views);
 }
 
+/// Whether there is an answer with which it can end once the place has left the view. For a whole
+/// frame somebody looks for himself whether the hazard is there: any clear view does.
+bool PollResponder::MayStand(const OpenPoll& open) const {
+  const bool wants_frame = open.poll.picture == protocol::PollPicture::kFullFrame;
+  return IsGone(open) || open.is_seen || (wants_frame && open.clear_views > 0);
+}
+
 /// Orders the picture when the answer stands.
 bool PollResponder::IsReady(OpenPoll& open, double steady_s, const Vehicle& vehicle) {
   if (open.pictures || steady_s >= open.answer_by_s) return true;
   if (open.order != 0) return false;
-  const bool decided = open.matched_s || (IsGone(open) && steady_s >= open.no_stands_s);
+  const bool decided = open.matched_s || (MayStand(open) && steady_s >= open.no_stands_s);
   if (!decided) return false;
   if (open.poll.picture == protocol::PollPicture::kNone) return true;
   // It may have come after its frame.
@@ -266,12 +277,21 @@ bool PollResponder::IsReady(OpenPoll& open, double steady_s, const Vehicle& vehi
   return false;
 }
 
+/// What is written at the place in the picture: what the detector says of it.
+std::string PollResponder::MarkOf(const OpenPoll& open) {
+  if (open.is_seen) return imaging::MarkLabel(open.poll.class_name, open.match_confidence);
+  return open.poll.class_name + " not found";
+}
+
 void PollResponder::OrderPicture(OpenPoll& open) {
-  PictureOrder::Cut cut{open.view_box, config_.crop,
-                        open.poll.picture != protocol::PollPicture::kCrop};
+  PictureOrder::Cut cut{open.view_box, config_.crop, MarkOf(open)};
   cut.crop.quality = config_.jpeg_quality;
-  const std::size_t max_bytes = open.poll.max_picture_bytes;
-  cut.crop.max_bytes = cut.is_whole_image ? max_bytes : std::min(cut.crop.max_bytes, max_bytes);
+  std::size_t most_bytes = cut.crop.max_bytes;
+  if (open.poll.picture != protocol::PollPicture::kCrop) {
+    cut.crop.context = 0;
+    most_bytes = config_.max_frame_bytes;
+  }
+  cut.crop.max_bytes = std::min<std::size_t>(most_bytes, open.poll.max_picture_bytes);
   PictureOrder order;
   order.number = open.order = ++last_order_;
   order.image = open.view_image;
@@ -280,7 +300,7 @@ void PollResponder::OrderPicture(OpenPoll& open) {
 }
 
 void PollResponder::Answer(OpenPoll& open) {
-  const bool seen = open.matched_s.has_value();
+  const bool seen = open.is_seen;
   const bool not_there = !seen && IsGone(open);
   if (!seen && !not_there && !newest_base_) {
     ++counters_.unanswered;
@@ -290,7 +310,8 @@ void PollResponder::Answer(OpenPoll& open) {
   reply.poll = open.poll.poll;
   reply.hazard = open.poll.hazard;
   reply.drive_id = config_.drive_id;
-  const bool decided = seen || not_there;
+  // The picture's stamp and place are the answer's.
+  const bool decided = seen || not_there || (open.pictures && !open.pictures->empty());
   const geo::TrackPose& base = decided ? open.view_base : *newest_base_;
   reply.stamp_ns = decided ? open.view_ns : newest_ns_;
   reply.vehicle_position = base.position;

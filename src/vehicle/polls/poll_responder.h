@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -29,6 +30,10 @@ namespace livemap::vehicle {
 ///
 /// Change detection has a say, too: where it knows that a thing of the class went, one clear view
 /// without a match makes a no; where it knows that one came, nothing does.
+///
+/// Whoever asks for a whole frame wants to look for himself: then a yes waits for a view from
+/// within max_range_m, and "can't see" has a picture, too, where the place was in a clear view
+/// once.
 ///
 /// The responder holds images as the camera saw them, and never puts one into an answer: it orders
 /// the picture (TakePictureOrders) once the answer stands, and takes what may leave the vehicle
@@ -60,6 +65,7 @@ class PollResponder {
     double picture_wait_s = 3;
     int jpeg_quality = 70;     ///< 1..100.
     imaging::CropConfig crop;  ///< Of a picture that shows a part; its own quality does not count.
+    std::size_t max_frame_bytes = 100000;  ///< Of a whole frame, whatever the zone asks for.
     geo::GroundProjectionNoise projection;
   };
 
@@ -132,7 +138,7 @@ class PollResponder {
   struct OpenPoll {
     protocol::Poll poll;
     double answer_by_s;  // Steady: the answer leaves, with its picture or without.
-    double no_stands_s;  // Steady: from then on a no waits for no nearer view.
+    double no_stands_s;  // Steady: from then on nothing waits for a nearer view.
     std::map<Trouble, int> troubles;
     int clear_views = 0;
     std::optional<geo::GeoPoint> last_view;
@@ -145,6 +151,7 @@ class PollResponder {
     float vanished = 0;  // Confidence that a thing of the class went, by change detection; or came.
     float appeared = 0;
     int unregistered = 0;             // Images that change detection could not compare.
+    bool is_seen = false;             // There was a match: it is a yes.
     std::optional<double> matched_s;  // Steady; it only waits for the picture.
     std::uint64_t order = 0;          // Of its picture; 0: none yet.
     std::optional<std::vector<imaging::CroppedPicture>> pictures;  // Once that was answered.
@@ -167,7 +174,9 @@ class PollResponder {
                  const Vehicle& vehicle);
   static void SetView(OpenPoll& open, const placement::SightingFrame& frame,
                       const geo::TrackPose& base, const imaging::Box& box, const Vehicle& vehicle);
+  bool MayStand(const OpenPoll& open) const;
   bool IsReady(OpenPoll& open, double steady_s, const Vehicle& vehicle);
+  static std::string MarkOf(const OpenPoll& open);
   void OrderPicture(OpenPoll& open);
   void ForgetFrames();
   /// Whether views and changes make a no.

@@ -246,8 +246,9 @@ void HazardReporter::OrderPictures(WaitingFrame& waiting) {
   for (PlacedSighting& candidate : waiting.candidates) {
     if (IsKnown(candidate) || settling_.HasToWait(candidate)) continue;
     candidate.cut = order.cuts.size();
-    order.cuts.push_back({fits ? candidate.sighting.box : imaging::Box{}, config_.picture,
-                          /*is_whole_image=*/false});
+    const placement::Sighting& sighting = candidate.sighting;
+    order.cuts.push_back({fits ? sighting.box : imaging::Box{}, config_.picture,
+                          imaging::MarkLabel(sighting.class_name, sighting.confidence)});
   }
   if (order.cuts.empty()) return;
   order.number = waiting.order = ++last_order_;

@@ -14,6 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 using AnswerKind = protocol::PollAnswer::Answer;
 
@@ -96,7 +97,7 @@ class PollResponderTest : public ::testing::Test {
   /// Answers the responder's orders; the image has nobody to mask.
   void MakePictures(double time_s) {
     for (const PictureOrder& order : responder_.TakePictureOrders()) {
-      responder_.AddPictures(order.number, CutPictures(order, order.image.picture.bgr));
+      responder_.AddPictures(order.number, CutPictures(order, order.image.picture.bgr, false));
     }
     responder_.Process(time_s, steady_s_, vehicle_);
   }
@@ -429,7 +430,8 @@ TEST_F(PollResponderTest, ANoWithAPictureIsDecidedSoEarlyThatThePictureCanBeMade
   responder_.Process(3, answer_by_s - responder_.config().picture_wait_s + 0.01, vehicle_);
   const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
   ASSERT_THAT(orders, SizeIs(1));
-  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  responder_.AddPictures(orders[0].number,
+                         CutPictures(orders[0], orders[0].image.picture.bgr, false));
   responder_.Process(3, answer_by_s - 0.01, vehicle_);
   const protocol::PollAnswer reply = OnlyReply();
   EXPECT_EQ(reply.answer, AnswerKind::kNo);
@@ -464,7 +466,8 @@ TEST_F(PollResponderTest, AnAnswerWhosePictureIsBeingMadeStandsWhateverChangeDet
   const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
   ASSERT_THAT(orders, SizeIs(1));
   responder_.AddChange(Changed(poll_.position, false, "barrier"));
-  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  responder_.AddPictures(orders[0].number,
+                         CutPictures(orders[0], orders[0].image.picture.bgr, false));
   responder_.Process(4.1, steady_s_, vehicle_);
   const protocol::PollAnswer reply = OnlyReply();
   EXPECT_EQ(reply.answer, AnswerKind::kNo);
@@ -479,8 +482,80 @@ TEST_F(PollResponderTest, TheCropShowsThePlaceWithinTheSmallerOfBothBudgets) {
     return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
   });
   const protocol::PollAnswer reply = OnlyReply();
-  EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(240, 160));
+  EXPECT_EQ(cv::imdecode(reply.image, cv::IMREAD_COLOR).size(), cv::Size(480, 320));
   EXPECT_LE(reply.image.size(), responder_.config().crop.max_bytes);
+}
+
+TEST_F(PollResponderTest, AWholeFrameShowsAllOfTheImageWithinTheSmallerOfBothBudgets) {
+  const auto seen = [](double time_s) {
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  };
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  for (const std::uint32_t zone_bytes : {30000U, 4'000'000'000U}) {
+    poll_.poll = Named(static_cast<int>(zone_bytes % 97));
+    poll_.max_picture_bytes = zone_bytes;
+    responder_.Add(poll_, steady_s_);
+    Drive(2.7, 2.75, seen);
+    const std::vector<std::uint8_t> picture = OnlyReply().image;
+    EXPECT_EQ(cv::imdecode(picture, cv::IMREAD_COLOR).size(), cv::Size(640, 400)) << zone_bytes;
+    EXPECT_LE(picture.size(), std::min<std::size_t>(zone_bytes, 100000));
+  }
+}
+
+TEST_F(PollResponderTest, WhoAsksForAWholeFrameIsShownWhatWasNotRecognised) {
+  makes_pictures_ = false;
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  // One clear view, then the place has left the camera's view: too few for a no.
+  Drive(2.6, 2.65);
+  Drive(6.0, 6.05);
+  const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
+  ASSERT_THAT(orders, SizeIs(1));
+  EXPECT_EQ(orders[0].cuts.at(0).label, "pothole not found");
+  responder_.AddPictures(orders[0].number,
+                         CutPictures(orders[0], orders[0].image.picture.bgr, false));
+  responder_.Process(6.1, steady_s_, vehicle_);
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
+  EXPECT_EQ(reply.reason, "the place was in view too few times");
+  EXPECT_FALSE(reply.image.empty());
+  EXPECT_EQ(reply.stamp_ns, StampNs(2.6)) << "of the picture's image";
+}
+
+TEST_F(PollResponderTest, AYesFromAfarWaitsForANearerWholeFrame) {
+  const auto seen = [](double time_s) {
+    return std::vector<placement::Sighting>{{"pothole", 0.7F, BoxOfPlace(time_s)}};
+  };
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  Drive(2.2, 2.25, seen);
+  EXPECT_THAT(responder_.TakeReplies(), IsEmpty()) << "25 m away";
+  Drive(2.7, 2.75, seen);
+  protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kYes);
+  EXPECT_EQ(reply.stamp_ns, StampNs(2.7));
+  // Without a nearer view the far one has to do.
+  poll_.poll = Named(7);
+  responder_.Add(poll_, steady_s_);
+  Drive(2.2, 2.25, seen);
+  Drive(6.0, 6.05);
+  reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kYes);
+  EXPECT_EQ(reply.stamp_ns, StampNs(2.2));
+  EXPECT_THAT(reply.image, Not(IsEmpty()));
+}
+
+TEST_F(PollResponderTest, APlaceThatWasNeverInAClearViewMakesNoWholeFrame) {
+  poll_.picture = protocol::PollPicture::kFullFrame;
+  poll_.max_picture_bytes = 30000;
+  responder_.Add(poll_, steady_s_);
+  Drive(6.0, 6.5);
+  Expire();
+  const protocol::PollAnswer reply = OnlyReply();
+  EXPECT_EQ(reply.answer, AnswerKind::kCantSee);
+  EXPECT_THAT(reply.image, IsEmpty());
 }
 
 TEST_F(PollResponderTest, APictureIsOrderedOnceWhenTheAnswerStandsAlsoForANo) {
@@ -495,7 +570,8 @@ TEST_F(PollResponderTest, APictureIsOrderedOnceWhenTheAnswerStandsAlsoForANo) {
   Drive(2.0, 4.0);
   const std::vector<PictureOrder> orders = responder_.TakePictureOrders();
   ASSERT_THAT(orders, SizeIs(1)) << "once, though several views counted";
-  responder_.AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  responder_.AddPictures(orders[0].number,
+                         CutPictures(orders[0], orders[0].image.picture.bgr, false));
   responder_.Process(4.1, steady_s_, vehicle_);
   const protocol::PollAnswer reply = OnlyReply();
   EXPECT_EQ(reply.answer, AnswerKind::kNo);
@@ -503,7 +579,7 @@ TEST_F(PollResponderTest, APictureIsOrderedOnceWhenTheAnswerStandsAlsoForANo) {
   EXPECT_NEAR(shown.at<cv::Vec3b>(0, 0)[0],
               static_cast<double>((reply.stamp_ns - kEpochNs) / 100'000'000), 1)
       << "the picture of the image that speaks for the answer";
-  EXPECT_GE(shown.cols, 240);
+  EXPECT_GE(shown.cols, 480);
   EXPECT_LT(shown.cols, 640) << "not the whole image";
 }
 

@@ -126,7 +126,7 @@ class HazardReporterTest : public ::testing::Test {
   /// Answers the reporter's orders; the image has nobody to mask.
   void MakePictures() {
     for (const PictureOrder& order : reporter_->TakePictureOrders()) {
-      reporter_->AddPictures(order.number, CutPictures(order, order.image.picture.bgr));
+      reporter_->AddPictures(order.number, CutPictures(order, order.image.picture.bgr, false));
     }
   }
 

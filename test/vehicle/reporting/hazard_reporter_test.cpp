@@ -32,9 +32,9 @@ TEST_F(HazardReporterTest, PlacesTheHazardItselfToTheCentimetre) {
   EXPECT_GT(report.covariance_m2.determinant(), 0);
   const cv::Mat picture = cv::imdecode(report.image, cv::IMREAD_COLOR);
   EXPECT_EQ(report.image_format, "jpeg");
-  // The hazard and its surroundings, of which 240 pixels of the image's are the least.
-  EXPECT_EQ(picture.size(), cv::Size(240, 160));
-  EXPECT_EQ(report.shown.width, 240u);
+  // The hazard and its surroundings, of which 480 pixels of the image's are the least.
+  EXPECT_EQ(picture.size(), cv::Size(480, 320));
+  EXPECT_EQ(report.shown.width, 480u);
   EXPECT_LE(report.shown.x, report.box.x_min);
   EXPECT_GE(report.shown.x + report.shown.width, report.box.x_max);
   EXPECT_LE(report.image.size(), 12000u);
@@ -207,7 +207,8 @@ TEST_F(HazardReporterTest, PicturesAreOrderedOnceAndOnlyOfNews) {
   EXPECT_EQ(orders[0].cuts[0].subject, BoxAt(12, 0));
   reporter_->Process(3.1, steady_s_);
   EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
-  reporter_->AddPictures(orders[0].number, CutPictures(orders[0], orders[0].image.picture.bgr));
+  reporter_->AddPictures(orders[0].number,
+                         CutPictures(orders[0], orders[0].image.picture.bgr, false));
   look(3.2, BoxAt(8.8, 0));         // The same hazard, nearer.
   look(3.3, {300, 100, 320, 150});  // Not on the road.
   EXPECT_THAT(reporter_->TakePictureOrders(), IsEmpty());
