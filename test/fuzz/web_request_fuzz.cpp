@@ -13,6 +13,7 @@
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/officials/desk_body.h"
 #include "web/officials/official_decision.h"
 #include "web/ogc/ogc_query.h"
 #include "web/tiles/tile_file.h"
@@ -129,6 +130,18 @@ void CheckDecision(const std::string& text) {
     Require(decision.undoes || !decision.decision_id);
   } catch (const livemap::web::BadRequest& mistake) {
     Require(std::string(mistake.what()).find("accepted is") != std::string::npos);
+  }
+  for (const auto decision : {livemap::web::Decision::kComment, livemap::web::Decision::kAssign,
+                              livemap::web::Decision::kClass, livemap::web::Decision::kMove,
+                              livemap::web::Decision::kMerge, livemap::web::Decision::kFrame}) {
+    try {
+      const livemap::zone::DeskAction action = livemap::web::ParseDeskAction(decision, text);
+      Require(action.text.size() <= livemap::zone::kMaxDecisionTextBytes);
+      Require(action.team.size() <= livemap::zone::kMaxTeamBytes);
+      Require(livemap::geo::IsValid(action.position));
+    } catch (const livemap::web::BadRequest&) {
+      // Refused.
+    }
   }
   static livemap::web::OfficialAuthenticator gate({{"miller", std::string(64, 'a')}});
   Require(gate.Check(text, "client", 0).verdict !=

@@ -61,6 +61,33 @@ zone::ZoneService::Config ConfigOf(const std::string& directory) {
 
 std::int64_t Now() { return kNowNs; }
 
+/// An official asks for a whole frame, and a vehicle that stands before the hazard brings it.
+void AnswerForFrame(zone::ZoneService& zone, const zone::Hazard& hazard) {
+  zone::DeskAction action;
+  action.kind = zone::DecisionKind::kAskFrame;
+  zone.Act(hazard.uuid, "Anna", action);
+  constexpr double kSouthRad = 3.14159265358979323846;
+  const geo::GeoPoint at = geo::GeodesicDestination(hazard.position, kSouthRad, 30);
+  zone.UpdateVehicle({"car-8", "", at, 0, 0, kNowNs, 0});
+  for (const protocol::Poll& poll : zone.TakeDuePolls()) {
+    if (poll.vehicle_id != "car-8") continue;
+    protocol::PollAnswer answer;
+    answer.poll = poll.poll;
+    answer.hazard = poll.hazard;
+    answer.vehicle_id = poll.vehicle_id;
+    answer.stamp_ns = kNowNs;
+    answer.answer = protocol::PollAnswer::Answer::kYes;
+    answer.confidence = 0.5F;
+    answer.vehicle_position = at;
+    // The header of a JPEG of 32 x 32 pixels.
+    answer.image = {0xff, 0xd8, 0xff, 0xe0, 0, 4,  0, 0, 0xff, 0xc0, 0,
+                    11,   8,    0,    32,   0, 32, 1, 1, 0x11, 0};
+    answer.image_format = "jpeg";
+    zone.HandleAnswer(answer);
+  }
+  Require(zone.AnswerPictures(hazard.uuid, 10).size() == 1);
+}
+
 /// A database as the program writes it, made once; its first hazard is spared.
 struct Template {
   Template() {
@@ -78,6 +105,7 @@ struct Template {
       zone.Confirm(all.at(3).uuid, "Anna");
       zone.Handle(MakeReport(50, "car-7", 47));
       zone.Distrust("car-7", "Anna", "stolen");
+      AnswerForFrame(zone, all.at(1));
       zone.HandleMapChanges({MakeMapChange(1, "car-1", 50), MakeMapChange(2, "car-2", 50),
                              MakeMapChange(3, "car-1", 51)});
     }
@@ -86,6 +114,8 @@ struct Template {
     tables = {ReadFuzzTable(open, "hazards", "id", "1"),
               ReadFuzzTable(open, "events", "sequence"),
               ReadFuzzTable(open, "reports", "uuid"),
+              ReadFuzzTable(open, "answers", "poll_uuid"),
+              ReadFuzzTable(open, "answer_pictures", "poll_uuid"),
               ReadFuzzTable(open, "lives", "class_name"),
               ReadFuzzTable(open, "trust", "vehicle_key"),
               ReadFuzzTable(open, "places", "vehicle_id"),
@@ -134,6 +164,10 @@ void RequireWorking(zone::ZoneService& zone, const Template& made) {
     for (const zone::StoredEvent& event : zone.Events(hazard.uuid, 100)) {
       Require(event.reason.size() <= 200 && event.at_ns >= 0);
     }
+    for (const zone::AnswerPicture& picture : zone.AnswerPictures(hazard.uuid, 100)) {
+      Require(picture.image_sha256.size() == 64 && picture.confidence >= 0);
+    }
+    if (const auto frame = zone.FrameOf(hazard.uuid)) Require(frame->request.decision > 0);
   }
   // What officials decided can be looked at and taken back, whatever the rows say.
   for (const zone::Hazard& hazard : zone.Query(std::nullopt, 1, 1000)) {

@@ -246,6 +246,15 @@ void ReadZonePolls(ParameterReader& parameters, zone::ZoneService::Config& zone)
       "What such a picture shows: crop (the place and its surroundings) or full_frame. It becomes "
       "the hazard's picture, which officials see in the hazard's popup above the buttons by which "
       "they decide.");
+  parameters.Read("poll_frame_bytes", polls.frame_bytes, {0, 1e6},
+                  "Largest whole frame of a hazard for which an official asks the next vehicle. It "
+                  "is taken from poll_bytes_per_hour. 0, or more than poll_bytes_per_hour: none is "
+                  "asked for.",
+                  "bytes");
+  parameters.Read("frame_timeout_s", zone.frame_timeout_s, {60, 1e6},
+                  "Time that a request for a whole frame is open.", "s");
+  parameters.Read("frames_per_hour", zone.frames_per_hour, {1, 10000},
+                  "Number of whole frames for which one official may ask in an hour.");
   parameters.Read("poll_picture_share", polls.picture_share, {0, 1},
                   "Pictures are asked for while more than this share of the bytes is left.");
   parameters.Read("poll_picture_age_s", polls.picture_age_s, {0, 1e10},

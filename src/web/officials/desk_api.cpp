@@ -1,6 +1,7 @@
 #include "web/officials/desk_api.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -15,11 +16,35 @@ namespace livemap::web {
 namespace {
 
 constexpr std::string_view kSightingsEnding = "/sightings";
+constexpr std::string_view kFrameEnding = "/frame";
 constexpr std::int64_t kWeekNs = 7 * 86'400'000'000'000;
 constexpr std::size_t kMaxSightings = 200;
 constexpr std::size_t kMaxStreets = 100;
 constexpr std::size_t kDecisionsPerRead = 1000;
 constexpr std::size_t kDeskHazardsPerRead = 500;
+
+/// The id in "/api/v1/hazards/UUID" + `ending`; none for any other address.
+std::optional<std::string> HazardBefore(const std::string& path, std::string_view ending) {
+  const std::string_view hazards(kHazardAddress);
+  const std::string_view all(path);
+  if (path.size() <= hazards.size() + ending.size() + 1) return std::nullopt;
+  if (all.substr(0, hazards.size()) != hazards || path[hazards.size()] != '/') return std::nullopt;
+  if (all.substr(path.size() - ending.size()) != ending) return std::nullopt;
+  const std::size_t begin = hazards.size() + 1;
+  return path.substr(begin, path.size() - begin - ending.size());
+}
+
+const char* AnswerName(protocol::PollAnswer::Answer answer) {
+  switch (answer) {
+    case protocol::PollAnswer::Answer::kYes:
+      return "yes";
+    case protocol::PollAnswer::Answer::kNo:
+      return "no";
+    case protocol::PollAnswer::Answer::kCantSee:
+      break;
+  }
+  return "cant_see";
+}
 
 void AddCounts(const zone::DeskCounts& counts, Json& json) {
   json["opened"] = counts.opened;
@@ -37,20 +62,16 @@ void AddCounts(const zone::DeskCounts& counts, Json& json) {
 }  // namespace
 
 bool DeskApi::Has(const std::string& path) {
-  if (path == "/api/v1/assignments" || path == "/api/v1/statistics") return true;
-  const std::string_view hazards(kHazardAddress);
-  return path.size() > hazards.size() + kSightingsEnding.size() + 1 &&
-         path.compare(0, hazards.size(), hazards) == 0 &&
-         path.compare(path.size() - kSightingsEnding.size(), std::string::npos, kSightingsEnding) ==
-             0;
+  return path == "/api/v1/assignments" || path == "/api/v1/statistics" ||
+         HazardBefore(path, kSightingsEnding) || HazardBefore(path, kFrameEnding);
 }
 
 HttpResponse DeskApi::Answer(const RequestTarget& target) const {
   if (target.path == "/api/v1/statistics") return Statistics(ParseStatisticsQuery(target).weeks);
   RefuseQueryParameters(target);
   if (target.path == "/api/v1/assignments") return Assignments();
-  const std::size_t begin = std::string_view(kHazardAddress).size() + 1;
-  return Sightings(target.path.substr(begin, target.path.size() - begin - kSightingsEnding.size()));
+  if (const auto id = HazardBefore(target.path, kFrameEnding)) return Frame(*id);
+  return Sightings(HazardBefore(target.path, kSightingsEnding).value_or(""));
 }
 
 HttpResponse DeskApi::Assignments() const {
@@ -90,6 +111,42 @@ HttpResponse DeskApi::Sightings(const std::string& id) const {
                     {"merged", sighting.hazard != *uuid}});
   }
   answer["truncated"] = list.size() == kMaxSightings;
+  Json& answers = answer["answers"] = Json::array();
+  for (const zone::AnswerPicture& picture : zone_.AnswerPictures(*uuid, kMaxSightings)) {
+    answers.push_back(PictureOf(picture));
+  }
+  return JsonAnswer(answer);
+}
+
+Json DeskApi::PictureOf(const zone::AnswerPicture& picture) const {
+  const bool is_kept = zone_.ImagePath(picture.image_sha256).has_value();
+  return {{"time", Rfc3339(picture.stamp_ns)},
+          {"answer", AnswerName(picture.answer)},
+          {"confidence", Rounded(picture.confidence, 4)},
+          {"image", is_kept ? Json("/images/" + picture.image_sha256) : Json()},
+          {"why_no_image", is_kept ? Json() : Json("the picture is no longer kept")},
+          {"whole_frame", picture.decision != 0},
+          {"decision_id", picture.decision != 0 ? Json(picture.decision) : Json()}};
+}
+
+HttpResponse DeskApi::Frame(const std::string& id) const {
+  const auto uuid = Uuid::Parse(id);
+  if (!uuid) throw BadRequest("the hazard's id is no UUID");
+  if (!zone_.Find(*uuid)) return MakeErrorAnswer(404, "the zone knows no hazard with this id");
+  const auto status = zone_.FrameOf(*uuid);
+  Json answer;
+  answer["id"] = id;
+  answer["state"] = "none";
+  for (const char* key : {"asked", "until", "official", "decision_id", "picture"}) {
+    answer[key] = nullptr;
+  }
+  if (!status) return JsonAnswer(answer);
+  answer["state"] = zone::FrameStateName(status->state);
+  answer["asked"] = Rfc3339(status->request.asked_ns);
+  answer["until"] = Rfc3339(status->request.until_ns);
+  answer["official"] = status->request.official;
+  answer["decision_id"] = status->request.decision;
+  if (status->picture) answer["picture"] = PictureOf(*status->picture);
   return JsonAnswer(answer);
 }
 

@@ -113,6 +113,15 @@ zone::DeskAction ParseMerge(const std::string& body) {
   return action;
 }
 
+zone::DeskAction ParseFrame(const std::string& body) {
+  zone::DeskAction action;
+  action.kind = zone::DecisionKind::kAskFrame;
+  if (body.empty()) return action;
+  const Body json = ParseDeskBody(body, {"reason"}, R"({"reason": TEXT})");
+  action.text = TextOf(json, "reason", kMaxDecisionReasonBytes);
+  return action;
+}
+
 bool IsLeapYear(int year) { return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0; }
 
 int DaysOf(int year, int month) {
@@ -156,6 +165,8 @@ zone::DeskAction ParseDeskAction(Decision decision, const std::string& body) {
       return ParseMove(body);
     case Decision::kMerge:
       return ParseMerge(body);
+    case Decision::kFrame:
+      return ParseFrame(body);
     default:
       return ParseComment(body);
   }

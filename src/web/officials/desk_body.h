@@ -16,7 +16,8 @@ namespace livemap::web {
 ///   assign   {"team": TEXT or null, "due": "YYYY-MM-DD" or null}, "due" only with a team;
 ///   class    {"class": TEXT};
 ///   move     {"position": [LONGITUDE, LATITUDE]} in degrees;
-///   merge    {"other": UUID}: the hazard that is gone afterwards.
+///   merge    {"other": UUID}: the hazard that is gone afterwards;
+///   frame    {}, or no body at all.
 /// All but the comment may have a "reason" of at most kMaxDecisionReasonBytes. Throws BadRequest
 /// saying what is accepted.
 zone::DeskAction ParseDeskAction(Decision decision, const std::string& body);

@@ -60,6 +60,10 @@ HttpResponse OfficialApi::DecideAs(const std::string& official, const DecisionTa
     HttpResponse answer = JsonAnswer({{"error", conflict.what()}, {"changed", true}});
     answer.status = 409;
     return answer;
+  } catch (const zone::DecisionTooOften& refusal) {
+    HttpResponse answer = MakeErrorAnswer(429, refusal.what());
+    answer.headers.emplace_back("Retry-After", "120");
+    return answer;
   }
 }
 
@@ -174,6 +178,7 @@ const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) con
     case zone::DecisionKind::kReclassHazard:
     case zone::DecisionKind::kMoveHazard:
     case zone::DecisionKind::kMergeHazard:
+    case zone::DecisionKind::kAskFrame:
       return "hazard";
     case zone::DecisionKind::kConfirmMapChange:
     case zone::DecisionKind::kDismissMapChange:

@@ -23,6 +23,7 @@ constexpr DecisionAddress kAddresses[] = {
     {"/api/v1/hazards/", "/class", Decision::kClass},
     {"/api/v1/hazards/", "/move", Decision::kMove},
     {"/api/v1/hazards/", "/merge", Decision::kMerge},
+    {"/api/v1/hazards/", "/frame", Decision::kFrame},
     {"/api/v1/vehicles/", "/distrust", Decision::kDistrust},
     {"/api/v1/vehicles/", "/trust", Decision::kTrust},
     {"/api/v1/changes/", "/decision", Decision::kMapChange},

@@ -24,21 +24,27 @@ enum class Decision {
   kAssign,
   kClass,
   kMove,
-  kMerge
+  kMerge,
+  kFrame
 };
 
 /// Whether the decision leaves alone whether the hazard is there (zone::HazardDesk).
 constexpr bool IsDeskDecision(Decision decision) {
   return decision == Decision::kComment || decision == Decision::kAssign ||
          decision == Decision::kClass || decision == Decision::kMove ||
-         decision == Decision::kMerge;
+         decision == Decision::kMerge || decision == Decision::kFrame;
 }
 
 /// Whether a GET of the decision's address says what the decision would do.
 constexpr bool HasPreview(Decision decision) { return decision == Decision::kDistrust; }
 
+/// Whether there is anything to GET at the decision's address.
+constexpr bool CanBeRead(Decision decision) {
+  return HasPreview(decision) || decision == Decision::kFrame;
+}
+
 /// The address of a decision: "/api/v1/hazards/UUID/" with confirm, reject, undo, close, comment,
-/// assign, class, move or merge, "/api/v1/vehicles/NAME/distrust" or ".../trust",
+/// assign, class, move, merge or frame, "/api/v1/vehicles/NAME/distrust" or ".../trust",
 /// "/api/v1/changes/UUID/decision"; none for any other. The id is not yet read.
 struct DecisionTarget {
   Decision decision = Decision::kConfirm;

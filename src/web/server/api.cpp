@@ -186,8 +186,8 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     refusal.headers.emplace_back("Allow", "GET, HEAD, POST, DELETE");
     return refusal;
   }
-  const bool has_preview = decision && HasPreview(decision->decision);
-  const char* accepted = has_preview ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
+  const bool can_be_read = decision && CanBeRead(decision->decision);
+  const char* accepted = can_be_read ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
   HttpResponse answer =
       MakeErrorAnswer(405, std::string("the method is not allowed, accepted is ") + accepted);
   answer.headers.emplace_back("Allow", accepted);

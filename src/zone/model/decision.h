@@ -25,8 +25,9 @@ enum class DecisionKind : std::uint8_t {
   kReclassHazard = 10,  ///< It is of another class.
   kMoveHazard = 11,     ///< It lies elsewhere.
   kMergeHazard = 12,    ///< Another hazard is the same one, and gone from the map.
+  kAskFrame = 13,       ///< The next vehicle that passes is asked for the whole frame.
 };
-constexpr std::size_t kDecisionKinds = 13;
+constexpr std::size_t kDecisionKinds = 14;
 
 /// A decision's text, a comment's above all, has at most so many bytes of valid UTF-8.
 constexpr std::size_t kMaxDecisionTextBytes = 500;
@@ -35,11 +36,11 @@ constexpr std::size_t kMaxDecisionTextBytes = 500;
 constexpr bool IsOfDesk(DecisionKind kind) {
   return kind == DecisionKind::kComment || kind == DecisionKind::kAssign ||
          kind == DecisionKind::kReclassHazard || kind == DecisionKind::kMoveHazard ||
-         kind == DecisionKind::kMergeHazard;
+         kind == DecisionKind::kMergeHazard || kind == DecisionKind::kAskFrame;
 }
 
 /// "confirm", "reject", "confirm", "dismiss", "distrust", "undo", "trust", "comment", "assign",
-/// "close", "class", "move" or "merge".
+/// "close", "class", "move", "merge" or "frame".
 constexpr const char* DecisionName(DecisionKind kind) {
   switch (kind) {
     case DecisionKind::kConfirmHazard:
@@ -67,6 +68,8 @@ constexpr const char* DecisionName(DecisionKind kind) {
       return "move";
     case DecisionKind::kMergeHazard:
       return "merge";
+    case DecisionKind::kAskFrame:
+      return "frame";
   }
   return "unknown";
 }
@@ -74,6 +77,12 @@ constexpr const char* DecisionName(DecisionKind kind) {
 /// A decision that does not fit what is there now: its sentence says what stands in the way.
 /// Nothing of it was done, and the official may decide anew.
 class DecisionConflict : public Error {
+ public:
+  using Error::Error;
+};
+
+/// The official has done so too often for now: the sentence says how often one may.
+class DecisionTooOften : public Error {
  public:
   using Error::Error;
 };

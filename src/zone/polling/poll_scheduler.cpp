@@ -67,6 +67,9 @@ PollScheduler::PollScheduler(const Config& config, std::uint64_t seed)
   if (!(config.picture_bytes >= 0) || !(config.corridor_slope >= 0)) {
     throw Error("picture_bytes and corridor_slope must not be negative");
   }
+  if (!(config.frame_bytes >= 0 && config.frame_bytes <= 1e12)) {
+    throw Error("frame_bytes is " + std::to_string(config.frame_bytes) + ", accepted is 0 to 1e12");
+  }
 }
 
 double PollScheduler::DebtS(const Target& target, std::int64_t now_ns) const {
@@ -141,6 +144,7 @@ void PollScheduler::SetHazard(std::uint64_t hazard, const geo::GeoPoint& positio
 
 void PollScheduler::Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns) {
   ++target.version;
+  if (frames_.count(hazard) != 0) StartWaiting(hazard, target);
   const std::int64_t due_ns = DueNs(target, config_.price_s);
   if (due_ns == kNever) return;
   heap_.push_back({std::max(due_ns, now_ns), hazard, target.version});
@@ -158,6 +162,13 @@ void PollScheduler::CompactHeap() {
   std::make_heap(heap_.begin(), heap_.end());
 }
 
+/// Vehicles that come by from now on meet it, and those around it are looked at in the next tick.
+void PollScheduler::StartWaiting(std::uint64_t hazard, Target& target) {
+  if (!target.waiting) waiting_.Insert(target.position, hazard);
+  target.waiting = true;
+  look_around_.push_back(hazard);
+}
+
 void PollScheduler::StopWaiting(std::uint64_t hazard, Target& target) {
   if (!target.waiting) return;
   waiting_.Erase(target.position, hazard);
@@ -170,6 +181,34 @@ void PollScheduler::RemoveHazard(std::uint64_t hazard) {
   StopWaiting(hazard, found->second);
   hazards_.erase(found);
   asked_.erase(hazard);
+}
+
+void PollScheduler::AskForFrame(std::uint64_t hazard, std::int64_t until_ns, std::int64_t now_ns) {
+  if (!AsksForFrames() || until_ns < now_ns) return;
+  frames_[hazard] = {until_ns, {}};
+  const auto found = hazards_.find(hazard);
+  if (found != hazards_.end()) StartWaiting(hazard, found->second);
+}
+
+bool PollScheduler::MayAskForFrame(std::uint64_t hazard, std::uint64_t vehicle,
+                                   std::int64_t now_ns) const {
+  const auto frame = frames_.find(hazard);
+  if (frame == frames_.end() || now_ns > frame->second.until_ns) return false;
+  if (budget_.tokens() < config_.poll_bytes + config_.frame_bytes) return false;
+  const auto asked = frame->second.asked_ns.find(vehicle);
+  return asked == frame->second.asked_ns.end() || Seconds(now_ns - asked->second) >= kFrameAgainS;
+}
+
+/// They are few: officials ask for them one by one.
+void PollScheduler::ExpireFrames(std::int64_t now_ns) {
+  for (auto frame = frames_.begin(); frame != frames_.end();) {
+    auto& asked_ns = frame->second.asked_ns;
+    for (auto asked = asked_ns.begin(); asked != asked_ns.end();) {
+      asked = Seconds(now_ns - asked->second) >= kFrameAgainS ? asked_ns.erase(asked)
+                                                              : std::next(asked);
+    }
+    frame = now_ns > frame->second.until_ns ? frames_.erase(frame) : std::next(frame);
+  }
 }
 
 void PollScheduler::SetVehicle(const std::string& vehicle_id, const TrackPoint& point) {
@@ -222,6 +261,7 @@ std::vector<PollChoice> PollScheduler::TakeDue(std::int64_t now_ns) {
     ForgetRider(riders_.begin());
   }
   ExpirePolls(now_ns);
+  ExpireFrames(now_ns);
   ForgetAsked(now_ns);
   TakeFallenDue(now_ns);
   // What fell due or is free again asks the vehicles around it...
@@ -261,9 +301,7 @@ void PollScheduler::TakeFallenDue(std::int64_t now_ns) {
       std::push_heap(heap_.begin(), heap_.end());
       continue;
     }
-    waiting_.Insert(target.position, due.hazard);
-    target.waiting = true;
-    look_around_.push_back(due.hazard);
+    StartWaiting(due.hazard, target);
   }
 }
 
@@ -291,15 +329,26 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
     return;
   }
   if (Seconds(now_ns - rider.point.stamp_ns) > config_.vehicle_silence_s) return;
-  if (!Passes(rider.point, target.position) || WasAsked(hazard, rider.key, now_ns)) return;
-  if (budget_.tokens() < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
-  PollChoice choice{Uuid::Random(generator_), hazard, rider.id, false,
+  if (!Passes(rider.point, target.position)) return;
+  const bool frame_wanted = MayAskForFrame(hazard, rider.key, now_ns);
+  if (!frame_wanted) {
+    if (WasAsked(hazard, rider.key, now_ns)) return;
+    if (budget_.tokens() < config_.poll_bytes || DebtS(target, now_ns) < PriceS()) return;
+  }
+  PollChoice choice{Uuid::Random(generator_),
+                    hazard,
+                    rider.id,
+                    false,
+                    frame_wanted,
                     now_ns + Nanoseconds(config_.answer_timeout_s)};
   double bytes = config_.poll_bytes;
   const bool picture_old = Seconds(now_ns - target.picture_ns) > config_.picture_age_s;
   const bool plenty =
       budget_.tokens() > config_.picture_share * config_.bytes_per_hour + config_.picture_bytes;
-  if (config_.picture_bytes > 0 && picture_old && plenty) {
+  if (frame_wanted) {
+    bytes += config_.frame_bytes;
+    frames_[hazard].asked_ns[rider.key] = now_ns;
+  } else if (config_.picture_bytes > 0 && picture_old && plenty) {
     choice.picture_wanted = true;
     bytes += config_.picture_bytes;
   }
@@ -308,7 +357,8 @@ void PollScheduler::TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int
   ++target.open;
   ++rider.open;
   RecordPoll(hazard, rider.key, now_ns);
-  open_[choice.poll] = {hazard, rider.id, now_ns, choice.expires_ns, bytes, choice.picture_wanted};
+  open_[choice.poll] = {
+      hazard, rider.id, now_ns, choice.expires_ns, bytes, choice.picture_wanted, frame_wanted};
   expiry_order_.push_back(choice.poll);
   choices.push_back(std::move(choice));
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <list>
+#include <map>
 #include <optional>
 #include <random>
 #include <string>
@@ -26,6 +27,7 @@ struct PollChoice {
   std::uint64_t hazard = 0;  ///< The caller's id.
   std::string vehicle_id;
   bool picture_wanted = false;
+  bool frame_wanted = false;    ///< The whole frame, for an official (AskForFrame).
   std::int64_t expires_ns = 0;  ///< Zone clock; then the poll is closed by itself.
 };
 
@@ -51,6 +53,10 @@ struct PollChoice {
 /// Bytes. A bucket that fills with `bytes_per_hour` and holds one hour's; as it empties the price
 /// rises, price / fill^2, so that what is worth most is asked still.
 ///
+/// Frames. Of a hazard for which an official wants a whole frame the next vehicle that passes is
+/// asked whatever it costs in wrong map, one after the other until ForgetFrame, as far as there are
+/// bytes.
+///
 /// Cost. Hazards wait in a heap for the time they are due, and due ones in a grid for a vehicle to
 /// come by: a tick looks at what fell due and at what lies around vehicles that moved on or turned,
 /// never at all.
@@ -61,8 +67,9 @@ class PollScheduler {
     double bytes_per_hour = 10e6;  ///< Of polls, answers and pictures together.
     double poll_bytes = 600;       ///< One poll and its answer on the wire.
     double picture_bytes =
-        20000;                   ///< Most that an answer's picture may have; 0: never ask for one.
-    double picture_share = 0.5;  ///< Pictures are asked for while the bucket is fuller than this.
+        20000;                    ///< Most that an answer's picture may have; 0: never ask for one.
+    double frame_bytes = 100000;  ///< Most that a whole frame may have; 0: none is ever asked for.
+    double picture_share = 0.5;   ///< Pictures are asked for while the bucket is fuller than this.
     double picture_age_s = 7 * 86400.0;  ///< A told hazard's picture is renewed after this.
     double lookahead_s = 30;       ///< A vehicle is asked this long before it passes at most...
     double lookahead_m = 400;      ///< ...and at most this far ahead.
@@ -84,6 +91,7 @@ class PollScheduler {
     std::int64_t expires_ns = 0;
     double bytes = 0;  ///< Estimate of what poll and answer take, with the picture.
     bool picture_wanted = false;
+    bool frame_wanted = false;
   };
 
   /// Throws Error naming the value that is out of range. `seed`: of the grids' hashes (see
@@ -95,6 +103,20 @@ class PollScheduler {
   void SetHazard(std::uint64_t hazard, const geo::GeoPoint& position, const ClassModel& entry,
                  const PresenceRecord& life, std::int64_t picture_ns, std::int64_t now_ns);
   void RemoveHazard(std::uint64_t hazard);
+  /// From now on vehicles that pass the hazard are asked for a whole frame, until `until_ns` or
+  /// ForgetFrame, also while the hazard is unknown for a time. None is asked for it twice within
+  /// kFrameAgainS. A further call for the same hazard takes the place of the one before.
+  void AskForFrame(std::uint64_t hazard, std::int64_t until_ns, std::int64_t now_ns);
+  void ForgetFrame(std::uint64_t hazard) { frames_.erase(hazard); }
+  /// Whether the settings leave bytes for a whole frame at all.
+  bool AsksForFrames() const {
+    return config_.frame_bytes > 0 &&
+           config_.frame_bytes + config_.poll_bytes <= budget_.capacity();
+  }
+  /// Whether vehicles can be asked about the hazard at all.
+  bool HasHazard(std::uint64_t hazard) const { return hazards_.count(hazard) != 0; }
+  /// A vehicle that brought no frame is asked for the same one again after so long, s.
+  static constexpr double kFrameAgainS = 600;
   /// Where a vehicle is now. `point.stamp_ns` is when the zone heard it.
   void SetVehicle(const std::string& vehicle_id, const TrackPoint& point);
 
@@ -147,16 +169,24 @@ class PollScheduler {
     std::uint32_t version;
     friend bool operator<(const Due& a, const Due& b) { return a.at_ns > b.at_ns; }
   };
+  /// A whole frame that somebody waits for, and when each vehicle was last asked for it.
+  struct Frame {
+    std::int64_t until_ns = 0;
+    std::map<std::uint64_t, std::int64_t> asked_ns;
+  };
   double DebtS(const Target& target, std::int64_t now_ns) const;
   double PriceS() const;
   std::int64_t DueNs(const Target& target, double price_s) const;
   void Schedule(std::uint64_t hazard, Target& target, std::int64_t now_ns);
   void ForgetRider(RiderPlace rider);
+  void StartWaiting(std::uint64_t hazard, Target& target);
   void StopWaiting(std::uint64_t hazard, Target& target);
   void RecordPoll(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t at_ns);
   bool WasAsked(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t now_ns) const;
   void ForgetAsked(std::int64_t now_ns);
+  bool MayAskForFrame(std::uint64_t hazard, std::uint64_t vehicle, std::int64_t now_ns) const;
   void ExpirePolls(std::int64_t now_ns);
+  void ExpireFrames(std::int64_t now_ns);
   void TakeFallenDue(std::int64_t now_ns);
   void LookAround(std::uint64_t hazard, std::int64_t now_ns, std::vector<PollChoice>& choices);
   void TryAsk(std::uint64_t hazard, TrackedVehicle& rider, std::int64_t now_ns,
@@ -171,6 +201,7 @@ class PollScheduler {
   std::vector<Due> heap_;                   // Soonest first; entries of an old version are stale.
   geo::SpatialGrid waiting_;                // Hazards that are due.
   std::vector<std::uint64_t> look_around_;  // Due since the last tick, or free to be asked again.
+  std::unordered_map<std::uint64_t, Frame> frames_;  // By hazard.
   std::unordered_map<std::uint64_t, Asked> asked_;
   std::deque<std::pair<std::int64_t, std::uint64_t>> asked_order_;  // When noted, hazard.
   std::list<TrackedVehicle> riders_;                                // Longest silent first.

@@ -122,6 +122,7 @@ bool HazardDesk::Check(const Uuid& hazard, const DeskAction& action) const {
   if (action.kind == DecisionKind::kComment) return true;
   const Slot slot = SlotOnMap(hazard, "the hazard");
   const HazardRecord& record = state_.hazards.Record(slot);
+  if (action.kind == DecisionKind::kAskFrame) return true;
   if (action.kind == DecisionKind::kAssign) {
     if (!action.team.empty() && !protocol::IsAcceptableName(action.team, kMaxTeamBytes)) {
       throw Error("the team is not accepted: it must be printable UTF-8 of 1 to " +
@@ -159,7 +160,9 @@ void HazardDesk::CheckMerge(const Uuid& hazard, Slot slot, const DeskAction& act
 HazardDesk::Done HazardDesk::Apply(const Uuid& hazard, const std::string& official,
                                    const DeskAction& action, ZoneTransaction& transaction) {
   DecisionRecord record = MakeDeskRecord(hazard, official, action, transaction.now_ns());
-  if (action.kind == DecisionKind::kComment) return {state_.store.WriteDecision(record), {}, 0};
+  if (action.kind == DecisionKind::kComment || action.kind == DecisionKind::kAskFrame) {
+    return {state_.store.WriteDecision(record), {}, 0};
+  }
   if (action.kind == DecisionKind::kAssign) return Assign(std::move(record), hazard, action);
   const auto slot = state_.hazards.Find(hazard);
   if (!slot) return {};
@@ -275,8 +278,10 @@ std::optional<DecisionRecord> HazardDesk::MeantBy(const Uuid& hazard,
       if (decision.id != *meant) continue;
       return IsOfDesk(decision.kind) ? std::optional(std::move(decision)) : std::nullopt;
     }
-    if (decision.kind == DecisionKind::kComment || decision.kind == DecisionKind::kAssign) continue;
-    if (decision.kind == DecisionKind::kUndo) continue;
+    const bool leaves_hazard_alone = decision.kind == DecisionKind::kComment ||
+                                     decision.kind == DecisionKind::kAssign ||
+                                     decision.kind == DecisionKind::kAskFrame;
+    if (leaves_hazard_alone || decision.kind == DecisionKind::kUndo) continue;
     return IsOfDesk(decision.kind) ? std::optional(std::move(decision)) : std::nullopt;
   }
   return std::nullopt;
@@ -286,7 +291,9 @@ std::optional<std::string> HazardDesk::WhyNotUndoable(const DecisionRecord& deci
   const auto hazard = Uuid::Parse(decision.subject);
   const auto slot = hazard ? state_.hazards.Find(*hazard) : std::nullopt;
   if (!slot) return "the hazard is not known any more";
-  if (decision.kind == DecisionKind::kComment) return std::nullopt;
+  if (decision.kind == DecisionKind::kComment || decision.kind == DecisionKind::kAskFrame) {
+    return std::nullopt;
+  }
   if (state_.hazards.State(*slot) == HazardState::kGone) return "the hazard is gone";
   if (decision.kind == DecisionKind::kMergeHazard) {
     const auto merged = UnpackMerged(decision.before);
@@ -332,6 +339,7 @@ void HazardDesk::TakeBack(const DecisionRecord& decision, const std::string& rea
   const auto hazard = Uuid::Parse(decision.subject);
   const auto slot = hazard ? state_.hazards.Find(*hazard) : std::nullopt;
   if (!slot || decision.kind == DecisionKind::kComment) return;
+  if (decision.kind == DecisionKind::kAskFrame) return;
   if (decision.kind == DecisionKind::kAssign) return TakeBackAssignment(decision, *hazard);
   if (decision.kind == DecisionKind::kMergeHazard) {
     return Split(decision, *slot, reason, transaction);

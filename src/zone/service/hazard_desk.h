@@ -15,8 +15,9 @@
 namespace livemap::zone {
 
 /// What officials do with hazards beside saying whether they are there: they comment, assign, name
-/// another class, move and merge. Each is a decision of the audit trail and can be taken back.
-/// Vehicles' later reports do not undo an edit: see Redirect.
+/// another class, move and merge, and ask for a whole frame (which PollCoordinator sees to). Each
+/// is a decision of the audit trail and can be taken back. Vehicles' later reports do not undo an
+/// edit: see Redirect.
 ///
 /// Not thread-safe. The caller holds the writer's lock; functions with a transaction are called
 /// while that runs.
@@ -43,12 +44,12 @@ class HazardDesk {
              ZoneTransaction& transaction);
 
   /// The desk's decision about the hazard that an undo means: that with the id `meant`, or else the
-  /// newest decision about it, unless that is a comment or an assignment. None where the undo means
-  /// no decision of the desk.
+  /// newest decision about it, unless that is a comment, an assignment or a request for a frame.
+  /// None where the undo means no decision of the desk.
   std::optional<DecisionRecord> MeantBy(const Uuid& hazard,
                                         std::optional<std::uint64_t> meant) const;
-  /// Whether it can be taken back now; else the sentence says why not. A comment and a merge can be
-  /// at any time, of the others only the newest of its kind.
+  /// Whether it can be taken back now; else the sentence says why not. A comment, a merge and a
+  /// request for a frame can be at any time, of the others only the newest of its kind.
   std::optional<std::string> WhyNotUndoable(const DecisionRecord& decision) const;
   Done Undo(const DecisionRecord& decision, const std::string& official, const std::string& why,
             ZoneTransaction& transaction);

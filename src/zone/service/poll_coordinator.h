@@ -1,13 +1,17 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/mutex.h"
+#include "common/queues/token_bucket.h"
 #include "common/uuid.h"
 #include "protocol/poll.h"
 #include "zone/admission/vehicle_allowance.h"
+#include "zone/desk/frame_request.h"
 #include "zone/model/vehicle_state.h"
 #include "zone/pictures/image_store.h"
 #include "zone/pictures/picture_allowance.h"
@@ -36,8 +40,10 @@ class PollCoordinator {
   struct AcceptedAnswer {
     const protocol::PollAnswer* answer = nullptr;
     Slot slot = 0;        ///< The hazard.
-    PictureName picture;  ///< On disk already; none unless the answer is yes.
+    PictureName picture;  ///< On disk already; none unless one was wanted.
     PictureCost picture_cost;
+    std::uint64_t frame =
+        0;  ///< Decision of the request whose whole frame the picture is; 0: none.
   };
 
   /// All outlive it. Throws Error for an impossible setting.
@@ -49,6 +55,20 @@ class PollCoordinator {
   void SetHazard(Slot slot, std::int64_t now_ns);
   /// Where a vehicle is now.
   void SetVehicle(const VehicleState& vehicle);
+
+  /// Whether `official` may ask vehicles for a whole frame of the hazard now, which counts against
+  /// what one may in an hour. Throws DecisionConflict where it cannot be asked for, or is already,
+  /// and DecisionTooOften.
+  void CheckFrame(Slot slot, const std::string& official, std::int64_t now_ns);
+  /// From now on vehicles are asked, until a frame comes or the request is over.
+  void AskForFrame(std::uint64_t decision, Slot slot, const std::string& official,
+                   std::int64_t now_ns);
+  /// Whether the request of that decision is open.
+  bool IsFrameOpen(std::uint64_t decision, std::int64_t now_ns);
+  /// Nobody is asked for it any more.
+  void CancelFrame(std::uint64_t decision);
+  /// After a start: the requests that are open in the store, whose hazards are loaded.
+  void RestoreFrames(std::int64_t now_ns);
 
   /// Polls to be sent now.
   std::vector<protocol::Poll> TakeDue(std::int64_t now_ns);
@@ -67,6 +87,9 @@ class PollCoordinator {
   std::optional<PollScheduler::OpenPoll> FindOpen(const Uuid& poll, std::int64_t now_ns);
   bool IsPictureWanted(const protocol::PollAnswer& answer,
                        const PollScheduler::OpenPoll& poll) const;
+  bool IsFrameWanted(const protocol::PollAnswer& answer, const PollScheduler::OpenPoll& poll,
+                     std::int64_t now_ns);
+  void DropOldFrames(std::int64_t now_ns);
   bool IsAcceptable(const protocol::PollAnswer& answer, const PollScheduler::OpenPoll& poll,
                     std::int64_t now_ns) const;
 
@@ -78,6 +101,9 @@ class PollCoordinator {
   VehicleAllowance& allowance_;
   const VehicleTable& vehicles_;
   PlaceBook& places_;
+
+  std::map<Slot, FrameRequest> frames_;  ///< The open ones; none of them is over for long.
+  KeyedTokenBuckets<1> frames_of_;       ///< By official, requests.
 
   Mutex mutex_;
   PollScheduler scheduler_ GUARDED_BY(mutex_);

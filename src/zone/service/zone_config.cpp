@@ -26,6 +26,14 @@ ZoneConfig CheckedConfig(ZoneConfig config) {
                 ", accepted is at least 2");
   }
   if (config.max_vehicles == 0) throw Error("max_vehicles is 0, accepted is at least 1");
+  if (!(config.frame_timeout_s > 0 && config.frame_timeout_s <= 1e7)) {
+    throw Error("frame_timeout_s is " + std::to_string(config.frame_timeout_s) +
+                ", accepted is above 0 to 1e7");
+  }
+  if (!(config.frames_per_hour >= 1 && config.frames_per_hour <= 1e6)) {
+    throw Error("frames_per_hour is " + std::to_string(config.frames_per_hour) +
+                ", accepted is 1 to 1e6");
+  }
   config.trust.malicious_share = config.life.malicious_share;
   if (config.replay) config.limits.max_age_s = std::numeric_limits<double>::infinity();
   return config;

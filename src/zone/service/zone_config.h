@@ -45,6 +45,10 @@ struct ZoneConfig {
   MapChangeRegistry::Rule map_changes;
   double map_changes_per_hour = 240;  ///< Of one vehicle, >= 1; further ones must wait.
   SightRule sight;                    ///< Whose answer to a poll counts.
+  /// Officials' requests for whole frames of polls.frame_bytes: how long one is open, s, and how
+  /// many one official may make in an hour, >= 1.
+  double frame_timeout_s = 4 * 3600.0;
+  double frames_per_hour = 30;
   /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
   /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
   bool replay = false;

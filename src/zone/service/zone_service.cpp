@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t kMaxHazardsAtOnce = 500;
 constexpr std::size_t kMaxLooksAtOnce = 100'000;
 constexpr std::size_t kShownDecisions = 20;
+/// So many decisions about a hazard are looked at for the newest request for a frame.
+constexpr std::size_t kMaxDecisionsForFrame = 1000;
 /// Between two pieces: a lock that is taken again at once lets nobody in.
 constexpr std::chrono::milliseconds kPause{2};
 
@@ -55,6 +57,7 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
     if (IsOnMap(record.life.state)) images_.Retain(record.picture.Sha256());
     Schedule(slot, now);
   }
+  polls_.RestoreFrames(now);
 }
 
 ZoneService::~ZoneService() = default;
@@ -283,10 +286,15 @@ std::optional<std::uint64_t> ZoneService::Act(const Uuid& hazard, const std::str
   officials_.CheckedReason(official, "");
   const MutexLock writer(writer_mutex_);
   if (!desk_.Check(hazard, action)) return std::nullopt;
-  return ChangeAtDesk([&](ZoneTransaction& transaction) {
+  const bool asks_for_frame = action.kind == DecisionKind::kAskFrame;
+  const Slot slot = StateForWriter().hazards.Find(hazard).value_or(0);
+  if (asks_for_frame) polls_.CheckFrame(slot, official, now_ns_());
+  const std::uint64_t decision = ChangeAtDesk([&](ZoneTransaction& transaction) {
     writer_mutex_.AssertHeld();
     return desk_.Apply(hazard, official, action, transaction);
   });
+  if (asks_for_frame) polls_.AskForFrame(decision, slot, official, now_ns_());
+  return decision;
 }
 
 /// None where the undo means no decision of the desk.
@@ -299,10 +307,14 @@ std::optional<ZoneService::Undone> ZoneService::UndoAtDesk(const Uuid& hazard,
   if (!decision) return std::nullopt;
   if (decision->undone_by != 0) return Undone::kBefore;
   if (const auto why_not = desk_.WhyNotUndoable(*decision)) throw DecisionConflict(*why_not);
+  if (decision->kind == DecisionKind::kAskFrame && !polls_.IsFrameOpen(decision->id, now_ns_())) {
+    throw DecisionConflict("the request for a whole frame is over");
+  }
   ChangeAtDesk([&](ZoneTransaction& transaction) {
     writer_mutex_.AssertHeld();
     return desk_.Undo(*decision, official, why, transaction);
   });
+  polls_.CancelFrame(decision->id);
   return Undone::kDone;
 }
 
@@ -594,15 +606,62 @@ std::vector<Assignment> ZoneService::Assignments() const {
   return assignments;
 }
 
-std::vector<SightingRecord> ZoneService::Sightings(const Uuid& hazard, std::size_t limit) const {
+/// The hazard and those that were merged into it.
+std::vector<Uuid> ZoneService::WithMerged(const Uuid& hazard, std::size_t limit) const {
   std::vector<Uuid> hazards{hazard};
   for (const DecisionRecord& decision : DecisionsAbout(hazard, limit)) {
     if (decision.kind != DecisionKind::kMergeHazard || decision.undone_by != 0) continue;
     const auto merged = Uuid::Parse(decision.before.substr(0, decision.before.find('|')));
     if (merged) hazards.push_back(*merged);
   }
+  return hazards;
+}
+
+std::vector<AnswerPicture> ZoneService::AnswerPictures(const Uuid& hazard,
+                                                       std::size_t limit) const {
+  std::vector<AnswerPicture> pictures;
+  for (const Uuid& each : WithMerged(hazard, limit)) {
+    const ZoneStore* store = nullptr;
+    std::uint64_t id = 0;
+    {
+      const ReaderLock lock(data_mutex_);
+      const ZoneState& state = StateForReaders();
+      const auto slot = state.hazards.Find(each);
+      if (!slot) continue;
+      store = &state.store;
+      id = state.hazards.Record(*slot).id;
+    }
+    const std::vector<AnswerPicture> more = store->LoadAnswerPictures(id, limit);
+    pictures.insert(pictures.end(), more.begin(), more.end());
+  }
+  std::stable_sort(pictures.begin(), pictures.end(),
+                   [](const auto& a, const auto& b) { return a.stamp_ns > b.stamp_ns; });
+  if (pictures.size() > limit) pictures.resize(limit);
+  return pictures;
+}
+
+std::optional<FrameStatus> ZoneService::FrameOf(const Uuid& hazard) const {
+  const std::vector<DecisionRecord> decisions = DecisionsAbout(hazard, kMaxDecisionsForFrame);
+  const auto newest = std::find_if(decisions.begin(), decisions.end(), [](const auto& decision) {
+    return decision.kind == DecisionKind::kAskFrame;
+  });
+  if (newest == decisions.end()) return std::nullopt;
+  FrameStatus status;
+  status.request = {newest->id, hazard, newest->official, newest->at_ns,
+                    newest->at_ns + Nanoseconds(config_.frame_timeout_s)};
+  for (AnswerPicture& picture : AnswerPictures(hazard, kMaxDecisionsForFrame)) {
+    if (picture.decision == newest->id) status.picture = std::move(picture);
+  }
+  status.state = status.picture                        ? FrameState::kTaken
+                 : newest->undone_by != 0              ? FrameState::kCancelled
+                 : now_ns_() > status.request.until_ns ? FrameState::kTimedOut
+                                                       : FrameState::kWaiting;
+  return status;
+}
+
+std::vector<SightingRecord> ZoneService::Sightings(const Uuid& hazard, std::size_t limit) const {
   std::vector<SightingRecord> sightings;
-  for (const Uuid& each : hazards) {
+  for (const Uuid& each : WithMerged(hazard, limit)) {
     const ZoneStore* store = nullptr;
     std::uint64_t id = 0;
     std::size_t most = 0;

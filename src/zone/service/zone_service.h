@@ -154,10 +154,11 @@ class ZoneService {
   std::optional<std::uint64_t> Close(const Uuid& hazard, const std::string& official,
                                      const std::string& reason = "",
                                      const std::optional<SeenHazard>& seen = std::nullopt);
-  /// An official comments, assigns, edits or merges a hazard (HazardDesk): committed, with an event
-  /// where the hazard itself changes. Returns the decision's id; none for an unknown hazard. Throws
-  /// Error for what is not acceptable, DecisionConflict for what does not fit what is there, and
-  /// StoreError.
+  /// An official comments, assigns, edits or merges a hazard (HazardDesk), or asks for a whole
+  /// frame of it (PollCoordinator): committed, with an event where the hazard itself changes.
+  /// Returns the decision's id; none for an unknown hazard. Throws Error for what is not
+  /// acceptable, DecisionConflict for what does not fit what is there, DecisionTooOften for too
+  /// many requests for frames, and StoreError.
   std::optional<std::uint64_t> Act(const Uuid& hazard, const std::string& official,
                                    const DeskAction& action);
   /// The newest `limit` decisions about one hazard, the newest first. Throws StoreError. As Events.
@@ -167,6 +168,12 @@ class ZoneService {
   /// The newest `limit` reports of the hazard and of those that were merged into it, the newest
   /// first; empty for an unknown one. Throws StoreError. As Events.
   std::vector<SightingRecord> Sightings(const Uuid& hazard, std::size_t limit) const;
+  /// The newest `limit` pictures that came with answers about the hazard and about those that were
+  /// merged into it, the newest first; empty for an unknown one. Throws StoreError. As Events.
+  std::vector<AnswerPicture> AnswerPictures(const Uuid& hazard, std::size_t limit) const;
+  /// The newest request for a whole frame of the hazard (DecisionKind::kAskFrame) and what became
+  /// of it; none where nobody has asked. Throws StoreError. As Events.
+  std::optional<FrameStatus> FrameOf(const Uuid& hazard) const;
   /// The zone's clock.
   std::int64_t NowNs() const { return now_ns_(); }
   /// An official does not believe a vehicle: it is as suspect as can be, which fades as any
@@ -289,6 +296,7 @@ class ZoneService {
   std::optional<std::uint64_t> DecideMapChange(const Uuid& uuid, MapChangeState to,
                                                const std::string& official,
                                                const std::string& reason);
+  std::vector<Uuid> WithMerged(const Uuid& hazard, std::size_t limit) const;
   const ZoneStore& HistoryStore() const EXCLUDES(data_mutex_);
   bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
   std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);

@@ -129,6 +129,11 @@ void ZoneTransaction::KeepAnswer(const protocol::PollAnswer& answer, std::uint32
   answered_id_ = hazard_id;
 }
 
+void ZoneTransaction::KeepAnswerPicture(const std::string& image_sha256, std::uint64_t decision) {
+  answer_picture_ = image_sha256;
+  frame_decision_ = decision;
+}
+
 void ZoneTransaction::KeepMapChangeReport(const protocol::MapChangeReport& report,
                                           const Uuid& feature) {
   map_change_reports_.emplace_back(&report, feature);
@@ -159,6 +164,9 @@ void ZoneTransaction::Write() {
     store.WriteReport(*accepted.report, accepted.hazard_id, accepted.image_sha256, now_ns_);
   }
   if (answer_ != nullptr) store.WriteAnswer(*answer_, answered_id_, now_ns_);
+  if (answer_ != nullptr && !answer_picture_.empty()) {
+    store.WriteAnswerPicture(answer_->poll, answered_id_, answer_picture_, frame_decision_);
+  }
   for (const auto& [class_name, before] : learned_before_) {
     store.WriteLife(class_name, state_.survival.learned().at(class_name));
   }

@@ -95,6 +95,9 @@ class ZoneTransaction {
   void KeepReport(const protocol::Report& report, std::uint32_t hazard_id,
                   const std::string& image_sha256);
   void KeepAnswer(const protocol::PollAnswer& answer, std::uint32_t hazard_id);
+  /// The kept answer's picture, which is on disk, and the decision whose request's whole frame it
+  /// is; 0: of none.
+  void KeepAnswerPicture(const std::string& image_sha256, std::uint64_t decision);
   void KeepMapChangeReport(const protocol::MapChangeReport& report, const Uuid& feature);
 
   // After Run: what followed.
@@ -137,7 +140,9 @@ class ZoneTransaction {
   std::map<std::uint64_t, TrustRecord> trust_before_;      ///< By vehicle.
   std::vector<AcceptedReport> reports_;
   const protocol::PollAnswer* answer_ = nullptr;
-  std::uint32_t answered_id_ = 0;  ///< Hazard of the answer.
+  std::uint32_t answered_id_ = 0;     ///< Hazard of the answer.
+  std::string answer_picture_;        ///< SHA-256; empty: none.
+  std::uint64_t frame_decision_ = 0;  ///< Of the answer's picture.
   std::vector<MapChangeEvent> map_change_events_;
   std::vector<std::pair<const protocol::MapChangeReport*, Uuid>>
       map_change_reports_;  ///< And the feature.

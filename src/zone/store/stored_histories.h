@@ -10,6 +10,7 @@
 
 #include "common/mutex.h"
 #include "common/sqlite.h"
+#include "zone/store/answer_picture_table.h"
 #include "zone/store/decision_table.h"
 #include "zone/store/desk_table.h"
 #include "zone/store/event_log.h"
@@ -53,6 +54,13 @@ class StoredHistories {
     return Ask([&](Reader& reader) { return reader.desk.LoadSightings(hazard_id, hazard, limit); });
   }
 
+  /// AnswerPictureTable::LoadAnswerPictures. Throws as that does.
+  std::vector<AnswerPicture> AnswerPictures(std::uint64_t hazard_id, std::size_t limit) {
+    return Ask([&](Reader& reader) {
+      return reader.answer_pictures.LoadAnswerPictures(hazard_id, limit);
+    });
+  }
+
   /// EventLog::LoadTurnsAfter. Throws as that does.
   std::vector<StoredEvent> TurnsAfter(std::uint64_t sequence, std::size_t limit) {
     return Ask([&](Reader& reader) { return reader.events.LoadTurnsAfter(sequence, limit); });
@@ -69,13 +77,15 @@ class StoredHistories {
           events(connection),
           map_changes(connection),
           decisions(connection),
-          desk(connection) {}
+          desk(connection),
+          answer_pictures(connection) {}
 
     StoreConnection connection;
     EventLog events;
     MapChangeTable map_changes;
     DecisionTable decisions;
     DeskTable desk;
+    AnswerPictureTable answer_pictures;
   };
 
   /// Once more over a new connection where the old one has broken.

@@ -498,6 +498,20 @@ const Statements& PostgresqlSchemaOfVersion8() {
   return kStatements;
 }
 
+/// Which pictures came with answers to polls, and for which official's request (0: for none).
+/// Pictures of before that came with answers are in the store of pictures alone.
+const Statements& ZoneSchemaToVersion9() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS answer_pictures (
+           poll_uuid VARCHAR(36) PRIMARY KEY,
+           hazard_id BIGINT NOT NULL,
+           image_sha256 VARCHAR(64) NOT NULL,
+           decision_id BIGINT NOT NULL))",
+      "CREATE INDEX IF NOT EXISTS answer_pictures_by_hazard ON answer_pictures (hazard_id)",
+      "INSERT INTO livemap_schema (version) VALUES (9)"};
+  return kStatements;
+}
+
 int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -523,7 +537,7 @@ void MigrateZoneStore(StoreConnection& connection, const std::string& database) 
   const std::array<const Statements*, kZoneSchemaVersion> steps{
       &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
       &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6(),
-      &ZoneSchemaToVersion7(), &ZoneSchemaToVersion8()};
+      &ZoneSchemaToVersion7(), &ZoneSchemaToVersion8(), &ZoneSchemaToVersion9()};
   int step = version;
   if (connection.is_postgresql() && version == 0) {
     soci::transaction transaction(session);

@@ -10,6 +10,7 @@
 
 #include "common/sqlite.h"
 #include "common/uuid.h"
+#include "zone/store/answer_picture_table.h"
 #include "zone/store/decision_table.h"
 #include "zone/store/desk_table.h"
 #include "zone/store/event_log.h"
@@ -87,7 +88,8 @@ class ZoneStore::Implementation {
           map_changes(connection),
           places(connection),
           decisions(connection),
-          desk(connection) {}
+          desk(connection),
+          answer_pictures(connection) {}
 
     StoreConnection connection;
     HazardTable hazards;
@@ -98,6 +100,7 @@ class ZoneStore::Implementation {
     PlaceTable places;
     DecisionTable decisions;
     DeskTable desk;
+    AnswerPictureTable answer_pictures;
   };
 
   explicit Implementation(const std::string& database)
@@ -360,6 +363,15 @@ std::vector<SightingRecord> ZoneStore::LoadSightings(std::uint64_t hazard_id, co
   return implementation_->histories().Sightings(hazard_id, hazard, limit);
 }
 
+std::vector<AnswerPicture> ZoneStore::LoadAnswerPictures(std::uint64_t hazard_id,
+                                                         std::size_t limit) const {
+  return implementation_->histories().AnswerPictures(hazard_id, limit);
+}
+
+std::vector<FrameRequest> ZoneStore::LoadFrameRequests(std::int64_t since_ns) {
+  return implementation_->writer().answer_pictures.LoadFrameRequests(since_ns);
+}
+
 StoreDamage ZoneStore::LoadRedirects(const std::function<void(Redirect)>& take) {
   return implementation_->writer().desk.LoadRedirects(take);
 }
@@ -427,6 +439,12 @@ void ZoneStore::WriteEvent(const HazardEvent& event, std::uint64_t hazard_id,
 void ZoneStore::WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
                             std::int64_t received_ns) {
   implementation_->writer().reports.WriteAnswer(answer, hazard_id, received_ns);
+}
+
+void ZoneStore::WriteAnswerPicture(const Uuid& poll, std::uint64_t hazard_id,
+                                   const std::string& image_sha256, std::uint64_t decision) {
+  implementation_->writer().answer_pictures.WriteAnswerPicture(poll, hazard_id, image_sha256,
+                                                               decision);
 }
 
 void ZoneStore::WriteLife(const std::string& class_name, const LearnedLifetime& learned) {

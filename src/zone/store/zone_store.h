@@ -14,6 +14,7 @@
 #include "zone/belief/survival_model.h"
 #include "zone/belief/vehicle_trust.h"
 #include "zone/desk/desk_action.h"
+#include "zone/desk/frame_request.h"
 #include "zone/desk/redirects.h"
 #include "zone/model/decision.h"
 #include "zone/model/hazard.h"
@@ -130,6 +131,12 @@ class ZoneStore {
   /// them.
   std::vector<SightingRecord> LoadSightings(std::uint64_t hazard_id, const Uuid& hazard,
                                             std::size_t limit) const;
+  /// The newest `limit` pictures that came with answers about the hazard of this row, the newest
+  /// first; broken rows are left out. Any thread may.
+  std::vector<AnswerPicture> LoadAnswerPictures(std::uint64_t hazard_id, std::size_t limit) const;
+  /// Officials' requests for whole frames since `since_ns` that stand and have no frame yet, in the
+  /// order of their decisions, without `until_ns`; broken rows are left out.
+  std::vector<FrameRequest> LoadFrameRequests(std::int64_t since_ns);
   /// Every redirect, in the order of their decisions; as LoadHazards.
   StoreDamage LoadRedirects(const std::function<void(Redirect)>& take);
   /// The newest `limit` decisions about a hazard, a map change or a vehicle
@@ -166,6 +173,10 @@ class ZoneStore {
                   std::uint64_t previous_sequence);
   void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
                    std::int64_t received_ns);
+  /// The picture came with the answer to that poll, and is the frame of that decision's request; 0:
+  /// of none.
+  void WriteAnswerPicture(const Uuid& poll, std::uint64_t hazard_id,
+                          const std::string& image_sha256, std::uint64_t decision);
   void WriteLife(const std::string& class_name, const LearnedLifetime& learned);
   void WriteTrust(std::uint64_t vehicle, const TrustRecord& record);
   /// Adds the place, or replaces that of the same vehicle and stamp.

@@ -67,6 +67,86 @@ TEST_F(DeskApiTest, EveryDecisionNeedsAnOfficial) {
   EXPECT_TRUE(Get(port(), "/api/v1/decisions").Json()["decisions"].empty());
 }
 
+TEST_F(DeskApiTest, AWholeFrameIsAskedForOnceAndWhatBecameOfItIsTold) {
+  const std::string id = Add();
+  EXPECT_EQ(Post(id, "frame", "", false).status, 401);
+  EXPECT_EQ(Post(id, "frame", R"({"text": "a"})").status, 400);
+  auto frame = Get(port(), "/api/v1/hazards/" + id + "/frame").Json();
+  EXPECT_EQ(frame["state"], "none");
+  EXPECT_TRUE(frame["asked"].is_null());
+  const std::uint64_t decision = Decide(id, "frame", "{}");
+  frame = Get(port(), "/api/v1/hazards/" + id + "/frame").Json();
+  EXPECT_EQ(frame["state"], "waiting");
+  EXPECT_EQ(frame["official"], TokenFile::official());
+  EXPECT_EQ(frame["decision_id"], decision);
+  EXPECT_EQ(frame["asked"], "2026-01-01T00:00:00.000Z");
+  EXPECT_EQ(frame["until"], "2026-01-01T04:00:00.000Z");
+  EXPECT_TRUE(frame["picture"].is_null());
+  EXPECT_EQ(Post(id, "frame", "{}").status, 409) << "one at a time";
+  const auto trail = Get(port(), "/api/v1/decisions?hazard=" + id).Json()["decisions"];
+  ASSERT_EQ(trail.size(), 1U);
+  EXPECT_EQ(trail[0]["decision"], "frame");
+  EXPECT_EQ(trail[0]["about"], "hazard");
+
+  // A vehicle comes from the south, is asked, and brings it.
+  constexpr double kMetres = 1 / 111'050.0;
+  for (const double metres : {60.0, 45.0, 30.0}) {
+    fixture_.now_ns += 1'000'000'000;
+    fixture_.zone->UpdateVehicle(
+        {"car-9",
+         "",
+         {kDeskPlace.latitude_deg - metres * kMetres, kDeskPlace.longitude_deg},
+         0,
+         15,
+         fixture_.now_ns});
+  }
+  const auto polls = fixture_.zone->TakeDuePolls();
+  ASSERT_EQ(polls.size(), 1U);
+  protocol::PollAnswer answer;
+  answer.poll = polls[0].poll;
+  answer.hazard = polls[0].hazard;
+  answer.vehicle_id = "car-9";
+  answer.stamp_ns = fixture_.now_ns;
+  answer.answer = protocol::PollAnswer::Answer::kNo;
+  answer.confidence = 0.8F;
+  answer.vehicle_position = {kDeskPlace.latitude_deg - 30 * kMetres, kDeskPlace.longitude_deg};
+  answer.image_format = "png";
+  answer.image = OnePixelPng();
+  ASSERT_TRUE(fixture_.zone->HandleAnswer(answer));
+  frame = Get(port(), "/api/v1/hazards/" + id + "/frame").Json();
+  EXPECT_EQ(frame["state"], "taken");
+  EXPECT_EQ(frame["picture"]["answer"], "no");
+  EXPECT_EQ(Get(port(), frame["picture"]["image"].get<std::string>()).status, 200);
+  const auto answers = Get(port(), "/api/v1/hazards/" + id + "/sightings").Json()["answers"];
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0]["whole_frame"], true);
+  EXPECT_EQ(answers[0]["decision_id"], decision);
+  EXPECT_EQ(answers[0]["image"], frame["picture"]["image"]);
+  EXPECT_EQ(Undo(id, decision).status, 409) << "it has come";
+}
+
+TEST_F(DeskApiTest, TooManyRequestsForFramesAreAnswered429) {
+  int status = 200;
+  int asked = 0;
+  for (; asked < 100 && status == 200; ++asked) {
+    status = Post(Add(0.001 * asked), "frame", "").status;
+  }
+  EXPECT_EQ(status, 429);
+  EXPECT_EQ(asked, 31) << "30 an hour by default";
+  fixture_.now_ns += 3'600'000'000'000;
+  EXPECT_EQ(Post(Add(0.5), "frame", "").status, 200);
+}
+
+TEST_F(DeskApiTest, TheAddressOfAFrameIsReadAndPosted) {
+  const std::string address = "/api/v1/hazards/" + Add() + "/frame";
+  const HttpResult put = Request(port(), "PUT", address, {}, "");
+  EXPECT_EQ(put.status, 405);
+  EXPECT_THAT(put.body, HasSubstr("GET, HEAD, POST"));
+  EXPECT_EQ(Get(port(), address + "?a=1").status, 400);
+  EXPECT_EQ(Get(port(), "/api/v1/hazards/00000000-0000-4000-8000-000000000001/frame").status, 404);
+  EXPECT_EQ(Get(port(), "/api/v1/hazards/me/frame").status, 400);
+}
+
 TEST_F(DeskApiTest, ACommentStandsInTheTrailOfItsHazard) {
   const std::string id = Add();
   const std::string other = Add(0.01);

@@ -342,5 +342,75 @@ TEST(PollSchedulerConfig, RefusesWhatIsOutOfRangeAndNamesIt) {
   EXPECT_THAT([&] { PollScheduler(config, 1); }, ThrowsMessage<Error>(HasSubstr("lookahead_m")));
 }
 
+TEST_F(PollSchedulerTest, AFrameIsAskedForAtOnceAndFromOneVehicleAfterTheOther) {
+  Set(1, Active(5400, kStart), kStart);
+  Approach("first", kStart + kSecond);
+  ASSERT_TRUE(Asked(kStart + kSecond).empty()) << "it was just seen";
+  scheduler_->AskForFrame(1, kStart + kHour, kStart + kSecond);
+  auto choices = scheduler_->TakeDue(kStart + kSecond);
+  ASSERT_EQ(choices.size(), 1u) << "the vehicle that is there already";
+  EXPECT_EQ(choices[0].vehicle_id, "first");
+  EXPECT_TRUE(choices[0].frame_wanted);
+  EXPECT_FALSE(choices[0].picture_wanted);
+  EXPECT_TRUE(scheduler_->FindOpen(choices[0].poll, kStart + kSecond)->frame_wanted);
+  Approach("second", kStart + 2 * kSecond);
+  EXPECT_TRUE(Asked(kStart + 2 * kSecond).empty()) << "one at a time";
+  // It brought none: the next one is asked, and the same one not before a while.
+  EXPECT_TRUE(scheduler_->Answered(choices[0].poll, 600, kStart + 3 * kSecond));
+  Approach("first", kStart + 3 * kSecond);
+  choices = scheduler_->TakeDue(kStart + 3 * kSecond);
+  ASSERT_EQ(choices.size(), 1u);
+  EXPECT_EQ(choices[0].vehicle_id, "second");
+  EXPECT_TRUE(scheduler_->Answered(choices[0].poll, 600, kStart + 4 * kSecond));
+  const std::int64_t later = kStart + Nanoseconds(PollScheduler::kFrameAgainS) + 2 * kSecond;
+  Approach("first", later);
+  EXPECT_THAT(Asked(later), ::testing::ElementsAre("first"));
+}
+
+TEST_F(PollSchedulerTest, NobodyIsAskedForAFrameThatHasComeOrWhoseTimeIsOver) {
+  Set(1, Active(5400, kStart), kStart);
+  scheduler_->AskForFrame(1, kStart + kHour, kStart);
+  scheduler_->ForgetFrame(1);
+  Approach("v", kStart + kSecond);
+  EXPECT_TRUE(Asked(kStart + kSecond).empty());
+  scheduler_->AskForFrame(1, kStart + 5 * kSecond, kStart + kSecond);
+  Approach("w", kStart + 6 * kSecond);
+  EXPECT_TRUE(Asked(kStart + 6 * kSecond).empty());
+}
+
+TEST_F(PollSchedulerTest, AFrameIsStillWantedAfterItsHazardHasChangedOrWasOffTheMap) {
+  const PresenceRecord life = Active(5400, kStart);
+  Set(1, life, kStart);
+  scheduler_->AskForFrame(1, kStart + kHour, kStart);
+  scheduler_->RemoveHazard(1);
+  Approach("v", kStart + kSecond);
+  EXPECT_TRUE(Asked(kStart + kSecond).empty());
+  Set(1, life, kStart + 2 * kSecond);
+  Approach("v", kStart + 2 * kSecond);
+  EXPECT_THAT(Asked(kStart + 2 * kSecond), ::testing::ElementsAre("v"));
+}
+
+TEST_F(PollSchedulerTest, FramesKeepToTheByteBudgetToo) {
+  config_.bytes_per_hour = 150000;
+  config_.frame_bytes = 100000;
+  Rebuild();
+  EXPECT_TRUE(scheduler_->AsksForFrames());
+  const PresenceRecord life = Active(5400, kStart);
+  for (std::uint64_t id = 1; id <= 3; ++id) {
+    Set(id, life, kStart);
+    scheduler_->AskForFrame(id, kStart + 10 * kHour, kStart);
+  }
+  Approach("v", kStart);
+  EXPECT_EQ(scheduler_->TakeDue(kStart).size(), 1u) << "bytes for one are left";
+  EXPECT_NEAR(scheduler_->bytes(), config_.poll_bytes + config_.frame_bytes, 1);
+  config_.bytes_per_hour = 50000;
+  Rebuild();
+  EXPECT_FALSE(scheduler_->AsksForFrames()) << "there are never so many bytes";
+  Set(1, life, kStart);
+  scheduler_->AskForFrame(1, kStart + kHour, kStart);
+  Approach("v", kStart);
+  EXPECT_TRUE(Asked(kStart).empty());
+}
+
 }  // namespace
 }  // namespace livemap::zone
