@@ -173,8 +173,8 @@ class CommandsTest(unittest.TestCase):
         front = subprocess.run([str(ROOT / "livemap"), "zone", "enrol", "car-1"], capture_output=True, text=True,
                                check=False)
         self.assertEqual(front.returncode, 2)
-        self.assertIn("zone takes init, enroll, revoke, install, user, backup, restore, export-labels, directory or arguments "
-                      "like name:=value", front.stderr)
+        self.assertIn("zone takes init, enroll, revoke, install, user, backup, restore, forget, export-labels, directory or "
+                      "arguments like name:=value", front.stderr)
 
 
 if __name__ == "__main__":

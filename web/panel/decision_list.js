@@ -12,7 +12,7 @@ const DONE = {
   confirm: 'Confirmed', reject: 'Rejected', dismiss: 'Dismissed', distrust: 'Distrusted',
   trust: 'Trusted again', undo: 'Took back a decision about', comment: 'Commented on',
   assign: 'Assigned', close: 'Closed as repaired', class: 'Changed the class of', move: 'Moved',
-  merge: 'Merged',
+  merge: 'Merged', forget: 'Forgot',
 };
 const SUBJECTS = { hazard: 'a hazard', map_change: 'a map change' };
 
@@ -53,7 +53,7 @@ export class DecisionList {
 
   row(decision) {
     const time = Date.parse(decision.time);
-    const subject = SUBJECTS[decision.about] ?? decision.subject;
+    const subject = decision.decision === 'forget' ? 'a vehicle' : SUBJECTS[decision.about] ?? decision.subject;
     const changed = decision.about === 'vehicle' && decision.hazards > 0 ? `, ${plural(decision.hazards, 'hazard')} changed` : '';
     const detail = decision.detail ? ` ${decision.detail}` : '';
     const isUndone = decision.undone_by !== null;

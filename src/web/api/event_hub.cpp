@@ -41,6 +41,7 @@ void EventHub::Stop() {
 
 void EventHub::Publish(const zone::ZoneEvent& event) {
   if (event.vehicle) trails_.Add(*event.vehicle);
+  if (event.forgotten) trails_.Forget(*event.forgotten);
   const MutexLock lock(mutex_);
   if (listeners_.empty()) return;
   LiveMessage message;

@@ -185,6 +185,7 @@ const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) con
       return "map_change";
     case zone::DecisionKind::kDistrustVehicle:
     case zone::DecisionKind::kTrustVehicle:
+    case zone::DecisionKind::kForgetVehicle:
       return "vehicle";
     case zone::DecisionKind::kUndo:
       break;

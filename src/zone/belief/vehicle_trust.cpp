@@ -90,6 +90,13 @@ TrustRecord VehicleTrust::Get(std::uint64_t vehicle) const {
   return found == records_.end() ? TrustRecord{} : found->second;
 }
 
+void VehicleTrust::Forget(std::uint64_t vehicle, std::uint64_t pseudonym) {
+  records_.erase(vehicle);
+  for (auto& [other, record] : records_) {
+    std::replace(record.vouchers.begin(), record.vouchers.end(), vehicle, pseudonym);
+  }
+}
+
 std::size_t VehicleTrust::Count(double malicious_above, std::int64_t now_ns) const {
   return static_cast<std::size_t>(
       std::count_if(records_.begin(), records_.end(), [&](const auto& record) {

@@ -70,6 +70,9 @@ class VehicleTrust {
   TrustRecord Get(std::uint64_t vehicle) const;
   /// Takes in what the store kept. False, and nothing is taken in, when it is no such record.
   bool Restore(std::uint64_t vehicle, const TrustRecord& record);
+  /// Nothing is held against the vehicle any more, and what it vouched for stands under another
+  /// key.
+  void Forget(std::uint64_t vehicle, std::uint64_t pseudonym);
   std::size_t vehicles() const { return records_.size(); }
   /// Vehicles that are malicious with at least this probability.
   std::size_t Count(double malicious_above, std::int64_t now_ns) const;

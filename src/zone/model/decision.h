@@ -26,8 +26,9 @@ enum class DecisionKind : std::uint8_t {
   kMoveHazard = 11,     ///< It lies elsewhere.
   kMergeHazard = 12,    ///< Another hazard is the same one, and gone from the map.
   kAskFrame = 13,       ///< The next vehicle that passes is asked for the whole frame.
+  kForgetVehicle = 14,  ///< All that leads to a vehicle was erased; the subject is a pseudonym.
 };
-constexpr std::size_t kDecisionKinds = 14;
+constexpr std::size_t kDecisionKinds = 15;
 
 /// A decision's text, a comment's above all, has at most so many bytes of valid UTF-8.
 constexpr std::size_t kMaxDecisionTextBytes = 500;
@@ -40,7 +41,7 @@ constexpr bool IsOfDesk(DecisionKind kind) {
 }
 
 /// "confirm", "reject", "confirm", "dismiss", "distrust", "undo", "trust", "comment", "assign",
-/// "close", "class", "move", "merge" or "frame".
+/// "close", "class", "move", "merge", "frame" or "forget".
 constexpr const char* DecisionName(DecisionKind kind) {
   switch (kind) {
     case DecisionKind::kConfirmHazard:
@@ -70,6 +71,8 @@ constexpr const char* DecisionName(DecisionKind kind) {
       return "merge";
     case DecisionKind::kAskFrame:
       return "frame";
+    case DecisionKind::kForgetVehicle:
+      return "forget";
   }
   return "unknown";
 }

@@ -1,6 +1,7 @@
 #include "zone/pictures/image_store.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,6 +39,13 @@ int WriteStoredImage(const std::string& path, const std::vector<std::uint8_t>& b
   }
   if (close(file) != 0 && error == 0) error = errno;
   return error;
+}
+
+/// When the file was written, system clock, UTC ns since 1970; 0 where there is none.
+std::int64_t StoredNs(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return 0;
+  return static_cast<std::int64_t>(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec;
 }
 
 /// Brings everything written to the directory's file system to disk. Returns errno's value.
@@ -88,8 +96,11 @@ void ImageStore::TakeStock() {
 
 void ImageStore::AddEntry(const std::string& sha256, const std::string& format,
                           std::uint64_t bytes) {
-  const auto [entry, is_new] = entries_.emplace(sha256, Entry{format, bytes, next_age_, 0});
+  const std::int64_t stored_ns = StoredNs(FilePath(sha256, format));
+  const bool is_new =
+      entries_.emplace(sha256, Entry{format, bytes, next_age_, stored_ns, 0}).second;
   if (!is_new) return;
+  by_time_.emplace(stored_ns, sha256);
   eviction_order_.insert({false, next_age_++, sha256});
   total_bytes_ += bytes;
 }
@@ -168,14 +179,36 @@ void ImageStore::Release(const std::string& sha256) { ChangeReferences(sha256, f
 void ImageStore::EvictBeyondCap() {
   const MutexLock lock(mutex_);
   while (total_bytes_ > cap_bytes_ && !eviction_order_.empty()) {
-    const std::string sha256 = eviction_order_.begin()->sha256;
-    eviction_order_.erase(eviction_order_.begin());
-    const auto found = entries_.find(sha256);
-    std::error_code ignored;
-    fs::remove(FilePath(sha256, found->second.format), ignored);
-    total_bytes_ -= found->second.bytes;
-    entries_.erase(found);
+    Drop(entries_.find(eviction_order_.begin()->sha256));
   }
+}
+
+void ImageStore::Drop(std::map<std::string, Entry>::iterator entry) {
+  const auto& [sha256, picture] = *entry;
+  std::error_code ignored;
+  fs::remove(FilePath(sha256, picture.format), ignored);
+  eviction_order_.erase({picture.references > 0, picture.age, sha256});
+  by_time_.erase({picture.stored_ns, sha256});
+  total_bytes_ -= picture.bytes;
+  entries_.erase(entry);
+}
+
+bool ImageStore::Remove(const std::string& sha256) {
+  const MutexLock lock(mutex_);
+  const auto entry = entries_.find(sha256);
+  if (entry == entries_.end()) return false;
+  Drop(entry);
+  return true;
+}
+
+std::size_t ImageStore::RemoveOlder(std::int64_t before_ns, std::size_t limit) {
+  const MutexLock lock(mutex_);
+  std::size_t removed = 0;
+  while (removed < limit && !by_time_.empty() && by_time_.begin()->first < before_ns) {
+    Drop(entries_.find(by_time_.begin()->second));
+    ++removed;
+  }
+  return removed;
 }
 
 std::uint64_t ImageStore::total_bytes() const {

@@ -39,13 +39,20 @@ class ImageStore {
   /// Deletes pictures until the cap holds. Called between batches, when references are settled.
   void EvictBeyondCap();
 
+  /// Deletes the picture, whoever refers to it. False where there is none.
+  bool Remove(const std::string& sha256);
+  /// Deletes the pictures that were stored before `before_ns`, by the system's clock, UTC ns since
+  /// 1970, whoever refers to them: at most `limit`, the oldest first. How many those were.
+  std::size_t RemoveOlder(std::int64_t before_ns, std::size_t limit);
+
   std::uint64_t total_bytes() const;
 
  private:
   struct Entry {
     std::string format;
     std::uint64_t bytes = 0;
-    std::uint64_t age = 0;  ///< Rises with every stored picture.
+    std::uint64_t age = 0;       ///< Rises with every stored picture.
+    std::int64_t stored_ns = 0;  ///< When the file was written, system clock.
     std::uint32_t references = 0;
   };
   /// Written, but not yet under its name.
@@ -65,6 +72,7 @@ class ImageStore {
   void TakeStock() REQUIRES(mutex_);
   void AddEntry(const std::string& sha256, const std::string& format, std::uint64_t bytes)
       REQUIRES(mutex_);
+  void Drop(std::map<std::string, Entry>::iterator entry) REQUIRES(mutex_);
   void ChangeReferences(const std::string& sha256, bool retain);
 
   const std::string directory_;
@@ -73,6 +81,8 @@ class ImageStore {
   std::map<std::string, Entry> entries_ GUARDED_BY(mutex_);    ///< By SHA-256.
   std::map<std::string, Pending> pending_ GUARDED_BY(mutex_);  ///< By SHA-256.
   std::set<Rank> eviction_order_ GUARDED_BY(mutex_);
+  /// By when it was stored.
+  std::set<std::pair<std::int64_t, std::string>> by_time_ GUARDED_BY(mutex_);
   std::uint64_t total_bytes_ GUARDED_BY(mutex_) = 0;
   std::uint64_t next_age_ GUARDED_BY(mutex_) = 0;
 };

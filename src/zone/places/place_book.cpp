@@ -240,6 +240,12 @@ void PlaceBook::ForgetOld(std::int64_t now_ns) {
   for (auto& [vehicle_id, entry] : entries_) ForgetBefore(entry.track, oldest_ns);
 }
 
+void PlaceBook::Forget(const std::string& vehicle_id) {
+  uncounted_.erase(vehicle_id);
+  const MutexLock lock(mutex_);
+  entries_.erase(vehicle_id);
+}
+
 /// The vehicle's own, or a new one in the place of the longest silent.
 PlaceBook::Entry& PlaceBook::EntryOf(const std::string& vehicle_id) {
   const auto known = entries_.find(vehicle_id);

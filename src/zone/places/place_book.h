@@ -75,6 +75,10 @@ class PlaceBook {
   /// second, in no transaction. Throws StoreError: then it is tried again.
   void ForgetOld(std::int64_t now_ns);
 
+  /// Forgets what memory has of the vehicle; the store's rows go by ZoneStore::EraseStep. For the
+  /// writer.
+  void Forget(const std::string& vehicle_id);
+
   /// Why the zone does not believe a position; none when it does, and then it is remembered.
   /// `vehicle.heard_ns` is the zone's clock.
   std::optional<Refusal> ChallengePosition(const VehicleState& vehicle);

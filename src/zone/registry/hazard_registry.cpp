@@ -199,6 +199,22 @@ void HazardRegistry::SetLife(Slot slot, const PresenceRecord& life, double prese
   NoteChange(slot);
 }
 
+bool HazardRegistry::RenameVoice(Slot slot, std::uint64_t vehicle, std::uint64_t pseudonym) {
+  PresenceRecord life = records_[slot].life;
+  bool is_found = false;
+  for (VehicleEvidence& voice : life.voices) {
+    if (voice.vehicle != vehicle) continue;
+    voice.vehicle = pseudonym;
+    is_found = true;
+  }
+  if (!is_found) return false;
+  RememberForUndo(slot);
+  CountWitness(records_[slot].life, -1);
+  records_[slot].life = life;
+  CountWitness(life, 1);
+  return true;
+}
+
 void HazardRegistry::Edit(Slot slot, const std::string& class_name, const HazardEstimate& estimate,
                           std::uint64_t sequence, std::int64_t now_ns) {
   RememberForUndo(slot);

@@ -86,6 +86,9 @@ class HazardRegistry {
   /// The hazard's life as it is at `now_ns`; one that is gone matches no report any more.
   void SetLife(Slot slot, const PresenceRecord& life, double presence, std::uint64_t sequence,
                std::int64_t now_ns);
+  /// What the vehicle said of the hazard stands under another key from now on; nothing else
+  /// changes. False when it has said nothing that is remembered.
+  bool RenameVoice(Slot slot, std::uint64_t vehicle, std::uint64_t pseudonym);
   /// An official has said of which class the hazard is and where it lies.
   void Edit(Slot slot, const std::string& class_name, const HazardEstimate& estimate,
             std::uint64_t sequence, std::int64_t now_ns);

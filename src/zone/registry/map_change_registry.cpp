@@ -315,6 +315,30 @@ void MapChangeRegistry::Unindex(Id id, const MapChangeFeature& feature) {
   --counts_[static_cast<std::size_t>(feature.state)];
 }
 
+std::size_t MapChangeRegistry::RenameWitness(const Pseudonyms& names, Id& next, Id max_looks) {
+  std::size_t renamed = 0;
+  for (Id looks = 0; looks < max_looks && next <= last_id_; ++looks, ++next) {
+    const auto known = features_.find(next);
+    if (known == features_.end()) continue;
+    MapChangeFeature feature = known->second;
+    const std::string about = feature.uuid.ToString();
+    bool is_found = false;
+    for (MapChangeWitness& witness : feature.witnesses) {
+      if (witness.vehicle != names.key()) continue;
+      is_found = true;
+      witness.vehicle = names.KeyFor(about);
+      // A drive's name may say whose it was.
+      for (std::size_t i = 0; i < witness.newest.size() && witness.newest[i] != 0; ++i) {
+        witness.newest[i] = names.KeyFor(about + " drive " + std::to_string(i));
+      }
+    }
+    if (!is_found) continue;
+    Put(next, std::move(feature));
+    ++renamed;
+  }
+  return renamed;
+}
+
 void MapChangeRegistry::Put(Id id, MapChangeFeature feature) {
   const auto known = features_.find(id);
   if (known == features_.end()) {

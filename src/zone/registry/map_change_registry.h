@@ -13,6 +13,7 @@
 #include "geo/spatial_grid.h"
 #include "protocol/map_change_report.h"
 #include "zone/belief/hazard_fusion.h"
+#include "zone/model/erasure.h"
 #include "zone/model/map_change.h"
 #include "zone/model/page.h"
 
@@ -85,6 +86,13 @@ class MapChangeRegistry {
   /// there is no such feature, or it is undone.
   std::optional<MapChangeEvent> TakeDecisionBack(const Uuid& uuid, const MapChangeFeature& before,
                                                  std::string reason, const Stamp& stamp);
+
+  /// What the vehicle said stands under its pseudonyms from now on, in those of `max_looks`
+  /// features from the id `next` on; nothing else changes. `next` becomes the first id that was not
+  /// looked at. How many features changed.
+  std::size_t RenameWitness(const Pseudonyms& names, Id& next, Id max_looks);
+  /// The greatest id that a feature has or had.
+  Id last_id() const { return last_id_; }
 
   const MapChangeFeature* Find(const Uuid& uuid) const;
   const MapChangeFeature& Get(Id id) const { return features_.at(id); }

@@ -88,4 +88,9 @@ std::vector<TrackPoint> VehicleTable::Track(const std::string& vehicle_id) const
   return {known->second.track.begin(), known->second.track.end()};
 }
 
+void VehicleTable::Forget(const std::string& vehicle_id) {
+  const MutexLock lock(mutex_);
+  vehicles_.erase(vehicle_id);
+}
+
 }  // namespace livemap::zone

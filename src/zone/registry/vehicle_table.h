@@ -31,6 +31,7 @@ class VehicleTable {
   /// The first `limit` of those whose id comes after `id`.
   std::vector<VehicleState> ListAfter(const std::string& id, std::size_t limit,
                                       std::int64_t now_ns) const;
+  void Forget(const std::string& vehicle_id);
   /// Where the vehicle was during the last two minutes, by when the zone heard it, oldest first, at
   /// most the newest 240 places.
   std::vector<TrackPoint> Track(const std::string& vehicle_id) const;

@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "common/mutex.h"
@@ -12,11 +13,12 @@
 
 namespace livemap::zone {
 
-/// One message of the zone's stream: exactly one of the three is set.
+/// One message of the zone's stream: exactly one of the four is set.
 struct ZoneEvent {
   std::optional<HazardEvent> hazard;
   std::optional<MapChangeEvent> map_change;
   std::optional<VehicleState> vehicle;
+  std::optional<std::string> forgotten;  ///< A vehicle of which nothing may be known any more.
 };
 
 /// Hands events to subscribers, one call at a time, in the order of the calls to Publish.

@@ -12,6 +12,10 @@ ZoneConfig CheckedConfig(ZoneConfig config) {
     throw Error("image_cap_bytes is " + std::to_string(config.image_cap_bytes) +
                 ", accepted is 0 to 1e15");
   }
+  if (!(config.picture_days >= 0 && config.picture_days <= 36500)) {
+    throw Error("picture_days is " + std::to_string(config.picture_days) +
+                ", accepted is 0 to 36500");
+  }
   if (!(config.vehicle_retention_s > 0 && config.vehicle_retention_s <= 1e6)) {
     throw Error("vehicle_retention_s is " + std::to_string(config.vehicle_retention_s) +
                 ", accepted is above 0 to 1e6");

@@ -26,6 +26,7 @@ struct ZoneConfig {
   std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
   std::string store_url;              ///< Of PostgreSQL, in place of zone.sqlite3 (ZoneStore).
   double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
+  double picture_days = 0;            ///< Pictures go so long after they came; 0: never.
   double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.
   std::size_t max_vehicles = 10000;   ///< The longest silent one goes beyond it.
   std::size_t max_hazards = 5000000;  ///< On the map; new ones beyond it are refused.

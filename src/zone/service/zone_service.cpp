@@ -21,6 +21,8 @@ constexpr std::size_t kMaxLooksAtOnce = 100'000;
 constexpr std::size_t kShownDecisions = 20;
 /// So many decisions about a hazard are looked at for the newest request for a frame.
 constexpr std::size_t kMaxDecisionsForFrame = 1000;
+/// That are deleted for their age in one step.
+constexpr std::size_t kMaxPicturesAtOnce = 100;
 /// Between two pieces: a lock that is taken again at once lets nobody in.
 constexpr std::chrono::milliseconds kPause{2};
 
@@ -61,20 +63,6 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
 }
 
 ZoneService::~ZoneService() = default;
-
-template <typename Body>
-void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
-  try {
-    transaction.Run(body);
-  } catch (const StoreError&) {
-    ++store_errors_;
-    store_well_ = false;
-    throw;
-  }
-  store_well_ = true;
-  sequence_ = StateForReaders().sequence;
-  announced_ = StateForReaders().announced;
-}
 
 void ZoneService::FollowUp(const ZoneTransaction& transaction) {
   for (const auto& [before, after] : transaction.pictures()) {
@@ -203,6 +191,9 @@ void ZoneService::Advance() {
   LetHazardsAge();
   places_.SaveCounts();
   places_.ForgetOld(now_ns_());
+  if (config_.picture_days > 0) {
+    images_.RemoveOlder(now_ns_() - Nanoseconds(config_.picture_days * 86400), kMaxPicturesAtOnce);
+  }
 }
 
 void ZoneService::LetHazardsAge() {

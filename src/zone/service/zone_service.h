@@ -20,6 +20,7 @@
 #include "zone/admission/vehicle_allowance.h"
 #include "zone/desk/desk_action.h"
 #include "zone/model/decision.h"
+#include "zone/model/erasure.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 #include "zone/model/page.h"
@@ -185,6 +186,15 @@ class ZoneService {
   /// Reject does, and DecisionConflict while another decision about the vehicle is carried out.
   std::optional<std::size_t> Distrust(const std::string& vehicle_id, const std::string& official,
                                       const std::string& reason);
+  /// Erases all that leads to a vehicle: what it said stands under pseudonyms, another one at each
+  /// hazard and map change, so that it counts as it did; its pictures are deleted, and where it
+  /// was, what is held against it, and what was decided about it no longer lead to it. Decisions
+  /// about it cannot be taken back any more. The trail has a decision `forget` of `by` without the
+  /// name, where there was anything. On disk no byte of its name stays in the store. In pieces, as
+  /// Distrust; what the vehicle tells meanwhile and afterwards is a new vehicle's. Throws Error for
+  /// an unacceptable name `by`, DecisionConflict while a decision about the vehicle is carried out,
+  /// and StoreError: then another call with the same pseudonyms does the rest.
+  ErasureCounts Forget(const Pseudonyms& names, const std::string& by);
   /// What came of an undo.
   using Undone = OfficialActions::Undone;
   /// Takes the newest confirmation, rejection or repair of the hazard back, or the desk's decision
@@ -298,6 +308,13 @@ class ZoneService {
                                                const std::string& reason);
   std::vector<Uuid> WithMerged(const Uuid& hazard, std::size_t limit) const;
   const ZoneStore& HistoryStore() const EXCLUDES(data_mutex_);
+  /// The parts of Forget, each in pieces.
+  void ForgetEvidence(const Pseudonyms& names, ErasureWalk& walk) EXCLUDES(writer_mutex_);
+  void ForgetMapChanges(const Pseudonyms& names, ErasureWalk& walk) EXCLUDES(writer_mutex_);
+  void ForgetRows(const Pseudonyms& names, ErasureWalk& walk) EXCLUDES(writer_mutex_);
+  void ForgetAnswerPictures(ErasureWalk& walk) EXCLUDES(writer_mutex_);
+  void ForgetForGood(const Pseudonyms& names, const ErasureCounts& counts, const std::string& by)
+      EXCLUDES(writer_mutex_);
   bool HasHeardOf(const std::string& vehicle_id) const REQUIRES(writer_mutex_);
   std::optional<geo::GeoBox> MakeView() const EXCLUDES(data_mutex_);
   void CountAnswer(bool accepted) EXCLUDES(data_mutex_);
@@ -352,5 +369,19 @@ class ZoneService {
   HazardDesk desk_ GUARDED_BY(writer_mutex_);
   Ageing ageing_ GUARDED_BY(writer_mutex_);
 };
+
+template <typename Body>
+void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
+  try {
+    transaction.Run(body);
+  } catch (const StoreError&) {
+    ++store_errors_;
+    store_well_ = false;
+    throw;
+  }
+  store_well_ = true;
+  sequence_ = StateForReaders().sequence;
+  announced_ = StateForReaders().announced;
+}
 
 }  // namespace livemap::zone

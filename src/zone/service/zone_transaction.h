@@ -85,6 +85,8 @@ class ZoneTransaction {
   void NameHazard(Slot slot, const std::string& reported_class);
   /// The hazard's class is another one now: in the store too, which else keeps the first name.
   void RenameHazard(Slot slot) { renamed_.insert(slot); }
+  /// The hazard's row is written as it is in the end, without an event.
+  void KeepHazard(Slot slot) { touched_.push_back(slot); }
   /// The hazard is passed in this direction: in memory and in the store.
   void KeepCourse(Slot slot, double course_rad);
   /// The event, whose sequence was `sequence() + 1`.

@@ -101,6 +101,9 @@ void StoreConnection::SetUpSqlite(const std::string& path, Use use) {
   std::string mode;
   session_ << "PRAGMA journal_mode=WAL", soci::into(mode);
   session_ << "PRAGMA foreign_keys=ON";
+  // What is erased or overwritten leaves nothing in the pages.
+  int erases = 0;
+  session_ << "PRAGMA secure_delete=ON", soci::into(erases);
   // 64 MB of pages stay in memory; the log is taken over after 40 MB, so that a page that many
   // commits touch is written to its place once for all of them.
   session_ << "PRAGMA cache_size=-65536";

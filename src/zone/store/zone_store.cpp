@@ -13,6 +13,7 @@
 #include "zone/store/answer_picture_table.h"
 #include "zone/store/decision_table.h"
 #include "zone/store/desk_table.h"
+#include "zone/store/erasure_tables.h"
 #include "zone/store/event_log.h"
 #include "zone/store/hazard_table.h"
 #include "zone/store/learned_tables.h"
@@ -89,7 +90,8 @@ class ZoneStore::Implementation {
           places(connection),
           decisions(connection),
           desk(connection),
-          answer_pictures(connection) {}
+          answer_pictures(connection),
+          erasure(connection) {}
 
     StoreConnection connection;
     HazardTable hazards;
@@ -101,6 +103,7 @@ class ZoneStore::Implementation {
     DecisionTable decisions;
     DeskTable desk;
     AnswerPictureTable answer_pictures;
+    ErasureTables erasure;
   };
 
   explicit Implementation(const std::string& database)
@@ -517,6 +520,23 @@ void ZoneStore::WriteMapChangeReport(const protocol::MapChangeReport& report, co
 
 void ZoneStore::WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id) {
   implementation_->writer().map_changes.WriteEvent(event, id);
+}
+
+void ZoneStore::EraseStep(const Pseudonyms& names, ErasureWalk& walk) {
+  implementation_->writer().erasure.Step(names, walk);
+}
+
+bool ZoneStore::EmptyLog() {
+  StoreConnection& connection = implementation_->writer().connection;
+  if (connection.is_postgresql()) return true;
+  return ExplainStore("emptying the write-ahead log", [&] {
+    int busy = 0;
+    int log_pages = 0;
+    int moved_pages = 0;
+    connection.session() << "PRAGMA wal_checkpoint(TRUNCATE)", soci::into(busy),
+        soci::into(log_pages), soci::into(moved_pages);
+    return busy == 0;
+  });
 }
 
 int ZoneStore::SchemaVersion() { return kZoneSchemaVersion; }

@@ -17,6 +17,7 @@
 #include "zone/desk/frame_request.h"
 #include "zone/desk/redirects.h"
 #include "zone/model/decision.h"
+#include "zone/model/erasure.h"
 #include "zone/model/hazard.h"
 #include "zone/model/map_change.h"
 #include "zone/model/store_damage.h"
@@ -207,6 +208,15 @@ class ZoneStore {
   void WriteMapChangeReport(const protocol::MapChangeReport& report, const Uuid& change,
                             std::int64_t received_ns);
   void WriteMapChangeEvent(const MapChangeEvent& event, std::uint64_t id);
+
+  /// The next step of forgetting a vehicle, in a transaction: a page of rows is looked at, and what
+  /// they say of the vehicle is put under its pseudonyms or dropped. `walk.pictures` are then those
+  /// that it sent. `walk.part` says what comes next.
+  void EraseStep(const Pseudonyms& names, ErasureWalk& walk);
+  /// Takes what was committed out of the write-ahead log, whose end holds rows as they were before
+  /// an erasure. False while a reader still needs it: to be tried again. PostgreSQL's log is its
+  /// server's, which writes over it in time.
+  bool EmptyLog();
 
   /// The schema that this program writes.
   static int SchemaVersion();

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "common/sha256.h"
 #include "common/sqlite.h"
@@ -91,6 +93,33 @@ TEST_F(ImageStoreTest, SaysSoWhenItCannotWrite) {
   std::ofstream(Directory()) << "a file stands in the way";
   EXPECT_THROW(store.Put(MakeJpeg(10, 10), "jpeg"), StoreError);
   EXPECT_THROW(ImageStore(Directory(), 1), StoreError);
+}
+
+TEST_F(ImageStoreTest, DeletesPicturesThatWereStoredLongAgoAFewAtATime) {
+  std::vector<std::string> names;
+  {
+    ImageStore store(Directory(), 1 << 20);
+    for (std::uint8_t i = 0; i < 4; ++i) names.push_back(Keep(store, MakeJpeg(9, 9, 10, i)));
+    const auto now = std::filesystem::file_time_type::clock::now();
+    for (int i = 0; i < 3; ++i) {
+      std::filesystem::last_write_time(*store.Path(names[static_cast<std::size_t>(i)]),
+                                       now - std::chrono::hours(24 * (10 - i)));
+    }
+  }
+  ImageStore store(Directory(), 1 << 20);
+  store.Retain(names[0]);
+  const std::int64_t week_ago_ns = SystemNs() - 7 * kOneDay - kOneDay / 2;
+  EXPECT_EQ(store.RemoveOlder(week_ago_ns, 2), 2U);
+  EXPECT_FALSE(store.Path(names[0])) << "though a hazard shows it";
+  EXPECT_FALSE(store.Path(names[1]));
+  EXPECT_TRUE(store.Path(names[2]));
+  EXPECT_EQ(store.RemoveOlder(week_ago_ns, 2), 1U);
+  EXPECT_EQ(store.RemoveOlder(week_ago_ns, 2), 0U);
+  EXPECT_TRUE(store.Path(names[3]));
+  store.Release(names[0]);
+  EXPECT_TRUE(store.Remove(names[3]));
+  EXPECT_FALSE(store.Remove(names[3]));
+  EXPECT_EQ(store.total_bytes(), 0U);
 }
 
 }  // namespace

@@ -1,0 +1,161 @@
+// livemap zone forget: erases all that leads to one vehicle from a zone's store.
+#include <pwd.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/clock.h"
+#include "common/error.h"
+#include "common/sqlite.h"
+#include "protocol/hazard_catalogue.h"
+#include "zone/pictures/owned_directory.h"
+#include "zone/service/erasure_desk.h"
+#include "zone/service/zone_service.h"
+#include "zone/store/erasure_requests.h"
+
+namespace {
+
+using livemap::Error;
+using livemap::zone::ErasureCounts;
+using livemap::zone::ErasureRequests;
+
+constexpr char kHelp[] =
+    R"(usage: ./livemap zone forget VEHICLE [--directory DIR] [--by NAME]
+
+Erases all that leads to the vehicle from the zone's store, also while the zone runs: its name in
+reports, answers and decisions gives way to random ones, where it was is dropped, and its pictures
+are deleted. Hazards stay, and count the vehicle as before. It cannot be taken back. Lock the
+vehicle out first (livemap zone revoke): what it tells afterwards is a new vehicle's.
+
+  --by NAME         who asks, for the audit trail (default: the user who calls)
+  --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
+)";
+
+struct Arguments {
+  std::string vehicle;
+  std::string directory;
+  std::string by;
+};
+
+/// Throws Error for what is not accepted.
+Arguments Parse(const std::vector<std::string>& words) {
+  Arguments arguments;
+  std::vector<std::string> places;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    std::string* value = nullptr;
+    if (words[i] == "--by") value = &arguments.by;
+    if (words[i] == "--directory") value = &arguments.directory;
+    if (value == nullptr) {
+      if (words[i].compare(0, 2, "--") == 0) {
+        throw Error("unknown flag '" + words[i] + "', accepted are --by and --directory");
+      }
+      places.push_back(words[i]);
+      continue;
+    }
+    if (i + 1 == words.size()) throw Error(words[i] + " needs a value");
+    *value = words[++i];
+  }
+  if (places.size() != 1) {
+    throw Error(std::to_string(places.size()) + " vehicles were given, accepted is one");
+  }
+  arguments.vehicle = places[0];
+  return arguments;
+}
+
+std::string Caller() {
+  const char* const sudo = std::getenv("SUDO_USER");
+  if (sudo != nullptr && *sudo != '\0') return sudo;
+  const passwd* const user = getpwuid(geteuid());
+  return user == nullptr ? std::to_string(geteuid()) : user->pw_name;
+}
+
+/// The folder of a store that there is: what was mistyped would look like a zone that has
+/// forgotten.
+std::string StoreFolder(std::string directory) {
+  if (directory.empty()) {
+    const char* const home = std::getenv("HOME");
+    directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
+  }
+  if (std::filesystem::is_regular_file(directory + "/zone.sqlite3")) return directory;
+  throw Error("there is no zone.sqlite3 in '" + directory +
+              "', accepted is the folder of the zone's store");
+}
+
+/// Null while a zone has the folder for itself.
+std::unique_ptr<livemap::zone::ZoneService> OpenStore(const std::string& directory) {
+  livemap::zone::ZoneConfig config;
+  config.directory = directory;
+  // Nothing goes for other reasons.
+  config.image_cap_bytes = 1e15;
+  try {
+    return std::make_unique<livemap::zone::ZoneService>(config, livemap::SystemNs, 1);
+  } catch (const livemap::StoreError& error) {
+    if (std::string(error.what()).find("is in use by another zone") == std::string::npos) throw;
+    return nullptr;
+  }
+}
+
+ErasureRequests::Outcome AwaitZone(const ErasureRequests& requests, std::int64_t id) {
+  std::cerr << "livemap zone forget: the running zone does it; the request stays if you stop "
+               "waiting\n";
+  for (;;) {
+    if (auto outcome = requests.Find(id)) return *outcome;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+}
+
+ErasureRequests::Outcome Forget(const Arguments& arguments) {
+  const std::string directory = StoreFolder(arguments.directory);
+  ErasureRequests requests(ErasureRequests::PathIn(directory));
+  const std::int64_t id = requests.Add(
+      arguments.vehicle, arguments.by.empty() ? Caller() : arguments.by, livemap::SystemNs());
+  auto zone = OpenStore(directory);
+  if (!zone) return AwaitZone(requests, id);
+  while (!requests.Find(id)) {
+    livemap::zone::WorkOffErasure(requests, *zone, livemap::SystemNs());
+  }
+  zone.reset();
+  // What an older version dropped may still stand in free pages.
+  livemap::SqliteDatabase database(directory + "/zone.sqlite3", true);
+  database.Execute("VACUUM");
+  database.Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  return *requests.Find(id);
+}
+
+void Run(const Arguments& arguments) {
+  const ErasureRequests::Outcome outcome = Forget(arguments);
+  if (!outcome.refusal.empty()) throw Error(outcome.refusal);
+  const ErasureCounts& counts = outcome.counts;
+  if (counts.rows() == 0 && counts.pictures == 0) {
+    std::cout << "the store has nothing of such a vehicle\n";
+    return;
+  }
+  std::cout << "forgotten: " << counts.reports << " reports, " << counts.answers << " answers, "
+            << counts.hazards << " hazards and map changes, " << counts.pictures << " pictures, "
+            << counts.places << " places\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  for (const std::string& word : words) {
+    if (word != "--help" && word != "-h") continue;
+    std::cout << kHelp;
+    return 0;
+  }
+  try {
+    Run(Parse(words));
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "livemap zone forget: " << error.what() << '\n';
+    return 2;
+  }
+}
