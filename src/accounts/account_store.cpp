@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -18,6 +19,9 @@ namespace livemap::accounts {
 namespace {
 
 constexpr std::array<Role, 3> kRoles{Role::kViewer, Role::kOfficial, Role::kAdmin};
+constexpr std::array<AccountEventKind, 6> kAccountEventKinds{
+    AccountEventKind::kLogIn, AccountEventKind::kWrongPassword, AccountEventKind::kLogOut,
+    AccountEventKind::kLock,  AccountEventKind::kUnlock,        AccountEventKind::kEndSessions};
 constexpr std::size_t kTokenBytes = 32;
 const std::vector<std::string>& Migrations() {
   // Two programs that open a new file at once both make its tables.
@@ -30,7 +34,11 @@ const std::vector<std::string>& Migrations() {
       "CREATE TABLE IF NOT EXISTS sessions (token_sha256 TEXT PRIMARY KEY, name TEXT NOT NULL "
       "REFERENCES "
       "accounts (name) ON DELETE CASCADE, opened_ns INTEGER NOT NULL) WITHOUT ROWID;"
-      "CREATE INDEX IF NOT EXISTS sessions_by_name ON sessions (name, opened_ns);"};
+      "CREATE INDEX IF NOT EXISTS sessions_by_name ON sessions (name, opened_ns);",
+      "CREATE TABLE IF NOT EXISTS locked (name TEXT PRIMARY KEY REFERENCES accounts (name) ON "
+      "DELETE CASCADE) WITHOUT ROWID;"
+      "CREATE TABLE IF NOT EXISTS account_events (id INTEGER PRIMARY KEY, kind TEXT NOT NULL, name "
+      "TEXT NOT NULL, done_by TEXT NOT NULL, client TEXT NOT NULL, at_ns INTEGER NOT NULL);"};
   return migrations;
 }
 
@@ -83,6 +91,24 @@ std::optional<Role> RoleOf(const std::string& name) {
     if (name == RoleName(role)) return role;
   }
   return std::nullopt;
+}
+
+const char* AccountEventName(AccountEventKind kind) {
+  switch (kind) {
+    case AccountEventKind::kLogIn:
+      return "log_in";
+    case AccountEventKind::kWrongPassword:
+      return "wrong_password";
+    case AccountEventKind::kLogOut:
+      return "log_out";
+    case AccountEventKind::kLock:
+      return "lock";
+    case AccountEventKind::kUnlock:
+      return "unlock";
+    case AccountEventKind::kEndSessions:
+      return "end_sessions";
+  }
+  return "unknown";
 }
 
 AccountStore::AccountStore(const std::string& path, const Config& config)
@@ -163,12 +189,93 @@ void AccountStore::Remove(const std::string& name) {
   RequireChange(name);
 }
 
+void AccountStore::SetLocked(const std::string& name, bool locked) {
+  const MutexLock lock(mutex_);
+  database_->Transaction([&] {
+    mutex_.AssertHeld();
+    auto there = database_->Prepare("SELECT 1 FROM accounts WHERE name = ?");
+    if (!there.Bind(1, name).Step()) throw Error("there is no account '" + name + "'");
+    there.Reset();
+    database_->Prepare("DELETE FROM locked WHERE name = ?").Bind(1, name).Execute();
+    if (!locked) return;
+    database_->Prepare("INSERT INTO locked VALUES (?)").Bind(1, name).Execute();
+    database_->Prepare("DELETE FROM sessions WHERE name = ?").Bind(1, name).Execute();
+  });
+}
+
+std::size_t AccountStore::EndSessions(const std::string& name) {
+  const MutexLock lock(mutex_);
+  std::int64_t ended = 0;
+  database_->Transaction([&] {
+    mutex_.AssertHeld();
+    auto there = database_->Prepare("SELECT 1 FROM accounts WHERE name = ?");
+    if (!there.Bind(1, name).Step()) throw Error("there is no account '" + name + "'");
+    there.Reset();
+    database_->Prepare("DELETE FROM sessions WHERE name = ?").Bind(1, name).Execute();
+    auto changes = database_->Prepare("SELECT changes()");
+    if (changes.Step()) ended = changes.Int(0);
+  });
+  return static_cast<std::size_t>(ended);
+}
+
+std::map<std::string, std::size_t> AccountStore::CountSessions(std::int64_t now_ns) const {
+  const MutexLock lock(mutex_);
+  std::map<std::string, std::size_t> counts;
+  auto query =
+      database_->Prepare("SELECT name, count(*) FROM sessions WHERE opened_ns > ? GROUP BY name");
+  query.Bind(1, now_ns - Nanoseconds(config_.session_s));
+  while (query.Step()) counts[query.Text(0)] = static_cast<std::size_t>(query.Int(1));
+  return counts;
+}
+
+void AccountStore::Note(const AccountEvent& event) {
+  const MutexLock lock(mutex_);
+  database_->Transaction([&] {
+    mutex_.AssertHeld();
+    database_
+        ->Prepare(
+            "INSERT INTO account_events (kind, name, done_by, client, at_ns) VALUES (?, ?, ?, ?, "
+            "?)")
+        .Bind(1, std::string(AccountEventName(event.kind)))
+        .Bind(2, event.name)
+        .Bind(3, event.by)
+        .Bind(4, event.client)
+        .Bind(5, event.at_ns)
+        .Execute();
+    database_
+        ->Prepare("DELETE FROM account_events WHERE id <= (SELECT max(id) FROM account_events) - ?")
+        .Bind(1, static_cast<std::int64_t>(kMaxEvents))
+        .Execute();
+  });
+}
+
+std::vector<AccountEvent> AccountStore::Events(std::uint64_t before, std::size_t limit) const {
+  const auto most = static_cast<std::uint64_t>(INT64_MAX);
+  const MutexLock lock(mutex_);
+  std::vector<AccountEvent> events;
+  auto query = database_->Prepare(
+      "SELECT id, kind, name, done_by, client, at_ns FROM account_events WHERE id < ? ORDER BY id "
+      "DESC LIMIT ?");
+  query.Bind(1, static_cast<std::int64_t>(std::min(before, most)))
+      .Bind(2, static_cast<std::int64_t>(std::min<std::uint64_t>(limit, most)));
+  while (query.Step()) {
+    const std::string kind = query.Text(1);
+    const auto known =
+        std::find_if(kAccountEventKinds.begin(), kAccountEventKinds.end(),
+                     [&](AccountEventKind one) { return kind == AccountEventName(one); });
+    if (known == kAccountEventKinds.end()) continue;  // A newer version's.
+    events.push_back({static_cast<std::uint64_t>(query.Int(0)), *known, query.Text(2),
+                      query.Text(3), query.Text(4), query.Int(5)});
+  }
+  return events;
+}
+
 std::vector<Account> AccountStore::List() const {
   const MutexLock lock(mutex_);
   std::vector<Account> accounts;
   auto query = database_->Prepare(
-      "SELECT name, role, created_ns, password_ns, coalesce(last_log_in_ns, 0) FROM accounts ORDER "
-      "BY name");
+      "SELECT name, role, created_ns, password_ns, coalesce(last_log_in_ns, 0), name IN (SELECT "
+      "name FROM locked) FROM accounts ORDER BY name");
   while (query.Step()) {
     Account account;
     account.name = query.Text(0);
@@ -176,6 +283,7 @@ std::vector<Account> AccountStore::List() const {
     account.created_ns = query.Int(2);
     account.password_ns = query.Int(3);
     if (query.Int(4) != 0) account.last_log_in = query.Int(4);
+    account.locked = query.Int(5) != 0;
     accounts.push_back(std::move(account));
   }
   return accounts;
@@ -186,9 +294,16 @@ bool AccountStore::HasAccounts() const {
   return database_->Prepare("SELECT 1 FROM accounts LIMIT 1").Step();
 }
 
+bool AccountStore::Has(const std::string& name) const {
+  const MutexLock lock(mutex_);
+  return database_->Prepare("SELECT 1 FROM accounts WHERE name = ?").Bind(1, name).Step();
+}
+
 std::optional<std::pair<std::string, Role>> AccountStore::FindHash(const std::string& name) const {
   const MutexLock lock(mutex_);
-  auto query = database_->Prepare("SELECT password_hash, role FROM accounts WHERE name = ?");
+  auto query = database_->Prepare(
+      "SELECT password_hash, role FROM accounts WHERE name = ? AND name NOT IN (SELECT name FROM "
+      "locked)");
   if (!query.Bind(1, name).Step()) return std::nullopt;
   return std::pair(query.Text(0), StoredRole(query.Text(1)));
 }
@@ -237,7 +352,7 @@ std::optional<Person> AccountStore::FindSession(const std::string& token,
   const MutexLock lock(mutex_);
   auto query = database_->Prepare(
       "SELECT name, role FROM sessions JOIN accounts USING (name) WHERE token_sha256 = ? AND "
-      "opened_ns > ?");
+      "opened_ns > ? AND name NOT IN (SELECT name FROM locked)");
   if (!query.Bind(1, hash).Bind(2, now_ns - Nanoseconds(config_.session_s)).Step()) {
     return std::nullopt;
   }

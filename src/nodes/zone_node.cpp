@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/clock.h"
+#include "common/time.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 #include "streets/address_file.h"
@@ -93,6 +94,9 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
         config_.zone.catalogue, SystemNs, EntropySeededGenerator()(),
         [](const std::string& line) { ROS_WARN("%s", line.c_str()); });
   }
+  erasures_ = std::make_unique<zone::ErasureDesk>(
+      config_.zone.directory, zone_, SystemNs,
+      [](const std::string& line) { ROS_INFO("%s", line.c_str()); });
   if (config_.web) {
     web_ = std::make_unique<web::WebServer>(config_.web_options, zone_, config_.zone.catalogue,
                                             orders_.get());
@@ -127,11 +131,30 @@ void ZoneNode::SayReady() const {
   if (web_) {
     const bool everywhere = config_.web_options.address == "0.0.0.0";
     const std::string host = everywhere ? "127.0.0.1" : config_.web_options.address;
-    map = "live map at http://" + host + ":" + std::to_string(web_->port()) + "/" +
+    const char* const scheme = web_->certificate() ? "https://" : "http://";
+    map = std::string("live map at ") + scheme + host + ":" + std::to_string(web_->port()) + "/" +
           (everywhere ? " and this machine's other addresses" : "");
   }
   ROS_INFO("zone ready in '%s' with %zu hazards: %s", config_.zone.directory.c_str(),
            zone_.Statistics().active_hazards, map.c_str());
+}
+
+/// Once each.
+void ZoneNode::SayCertificate(const web::CertificateState& certificate) {
+  if (certificate.loads != certificate_.loads) {
+    const double days = Seconds(certificate.ends_ns - SystemNs()) / 86400;
+    if (days > 0) {
+      ROS_INFO("the live map's certificate '%s' is valid for another %.1f days",
+               config_.web_options.certificate_file.c_str(), days);
+    } else {
+      ROS_WARN("the live map's certificate '%s' ended %.1f days ago: browsers refuse it",
+               config_.web_options.certificate_file.c_str(), -days);
+    }
+  }
+  if (!certificate.refusal.empty() && certificate.refusal != certificate_.refusal) {
+    ROS_WARN("%s", certificate.refusal.c_str());
+  }
+  certificate_ = certificate;
 }
 
 ZoneNode::~ZoneNode() {
@@ -208,7 +231,7 @@ void ZoneNode::RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t
 
 void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
   // Not shown in rviz, and no vehicle is told.
-  if (event.map_change) return;
+  if (event.map_change || event.forgotten) return;
   view_changed_ = true;
   const geo::GeoPoint place =
       event.hazard ? event.hazard->hazard.position : event.vehicle->position;
@@ -372,6 +395,12 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     counters.web_connections_ended = web.connections_ended;
     counters.web_connections_refused = web.connections_refused;
     counters.web_held_bytes = web.held_bytes;
+    counters.web_failed_handshakes = web.failed_handshakes;
+    if (const auto certificate = web_->certificate()) {
+      counters.web_certificate_s = Seconds(certificate->ends_ns - SystemNs());
+      counters.web_certificate_refusal = certificate->refusal;
+      SayCertificate(*certificate);
+    }
     counters.web_pictures_refused = web.pictures.refused;
     counters.web_pictures_last_refusal = web.pictures.last_refusal;
     counters.web_pictures_busy = web.pictures.busy;

@@ -28,6 +28,7 @@
 #include "zone/inbox/catch_up_planner.h"
 #include "zone/inbox/zone_inbox.h"
 #include "zone/registry/map_origin.h"
+#include "zone/service/erasure_desk.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::nodes {
@@ -59,6 +60,7 @@ class ZoneNode {
   /// Makes `datum` the origin of the map frame.
   void SetMap(const geo::GeoPoint& datum) REQUIRES(mutex_);
   void SayReady() const;
+  void SayCertificate(const web::CertificateState& certificate);
   void WorkUntilClosed();
   void CommitReports(const std::vector<protocol::Report>& reports);
   void CommitMapChanges(const std::vector<protocol::MapChangeReport>& reports);
@@ -97,7 +99,9 @@ class ZoneNode {
   diagnostic_updater::Updater updater_;
   int subscription_ = 0;
   std::unique_ptr<orders::OrderDesk> orders_;  ///< Null: the zone has no work orders.
+  std::unique_ptr<zone::ErasureDesk> erasures_;
   std::unique_ptr<web::WebServer> web_;
+  web::CertificateState certificate_;  ///< As it was told last; the diagnostics' timer's.
   std::thread worker_;
 };
 

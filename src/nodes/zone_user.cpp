@@ -1,4 +1,5 @@
 // livemap zone user: the people who may log in to a zone's map.
+#include <pwd.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -25,12 +26,14 @@ constexpr char kHelp[] =
        ./livemap zone user passwd NAME [--directory DIR]
        ./livemap zone user role NAME --role viewer|official|admin [--directory DIR]
        ./livemap zone user remove NAME [--directory DIR]
+       ./livemap zone user lock | unlock NAME [--directory DIR]
        ./livemap zone user list [--directory DIR]
 
 The people who may log in to the zone's map. A viewer sees vehicles and unconfirmed hazards, an
-official also decides, an admin may do the same as an official, so far. What is changed holds at
-once, also while the zone runs; a new password and a removal end all sessions. The password is asked
-for twice, or read from the first line of standard input where that is no terminal.
+official also decides, an admin also sees who logs in, ends sessions and locks accounts. What is
+changed holds at once, also while the zone runs; a new password, a lock and a removal end all
+sessions. The password is asked for twice, or read from the first line of standard input where that
+is no terminal.
 
   --role ROLE       what the person may do
   --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
@@ -61,11 +64,14 @@ Arguments Parse(const std::vector<std::string>& words) {
     if (i + 1 == words.size()) throw Error(words[i] + " needs a value");
     *value = words[++i];
   }
-  const std::vector<std::string> actions{"add", "passwd", "role", "remove", "list"};
+  const std::vector<std::string> actions{"add",  "passwd", "role", "remove",
+                                         "lock", "unlock", "list"};
   if (places.empty() || std::find(actions.begin(), actions.end(), places[0]) == actions.end()) {
     throw Error(
         (places.empty() ? "nothing" : "'" + places[0] + "'") +
-        std::string(" was given, accepted are add, passwd, role, remove and list (see --help)"));
+        std::string(
+            " was given, accepted are add, passwd, role, remove, lock, unlock and list (see "
+            "--help)"));
   }
   arguments.action = places[0];
   const bool is_list = arguments.action == "list";
@@ -126,8 +132,15 @@ void List(const AccountStore& accounts) {
     const std::string last =
         account.last_log_in ? livemap::Rfc3339Seconds(*account.last_log_in) : "never logged in";
     std::cout << account.name << '\t' << livemap::accounts::RoleName(account.role) << '\t' << last
-              << '\n';
+              << (account.locked ? "\tlocked" : "") << '\n';
   }
+}
+
+std::string Caller() {
+  const char* const sudo = std::getenv("SUDO_USER");
+  if (sudo != nullptr && *sudo != '\0') return sudo;
+  const passwd* const user = getpwuid(geteuid());
+  return user == nullptr ? std::to_string(geteuid()) : user->pw_name;
 }
 
 AccountStore Open(const Arguments& arguments) {
@@ -161,6 +174,15 @@ void Run(const Arguments& arguments) {
   } else if (arguments.action == "remove") {
     Open(arguments).Remove(name);
     std::cout << "removed " << name << '\n';
+  } else if (arguments.action == "lock" || arguments.action == "unlock") {
+    const bool locks = arguments.action == "lock";
+    AccountStore accounts = Open(arguments);
+    accounts.SetLocked(name, locks);
+    accounts.Note({0,
+                   locks ? livemap::accounts::AccountEventKind::kLock
+                         : livemap::accounts::AccountEventKind::kUnlock,
+                   name, Caller(), "", now_ns});
+    std::cout << arguments.action << "ed " << name << '\n';
   } else {
     List(Open(arguments));
   }

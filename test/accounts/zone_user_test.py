@@ -45,6 +45,14 @@ class ZoneUser(unittest.TestCase):
         self.assert_done(self.run_it("remove", "miller"))
         self.assertNotIn("miller", self.run_it("list").stdout)
 
+    def test_an_account_is_locked_and_unlocked(self):
+        self.assert_done(self.run_it("add", "miller", "--role", "official"))
+        self.assert_done(self.run_it("lock", "miller"))
+        self.assertEqual(self.run_it("list").stdout, "miller\tofficial\tnever logged in\tlocked\n")
+        self.assert_done(self.run_it("unlock", "miller"))
+        self.assertNotIn("locked", self.run_it("list").stdout)
+        self.assert_refused(self.run_it("lock", "jones"), "no account 'jones'")
+
     def test_mistakes_are_refused_by_one_sentence(self):
         self.assert_done(self.run_it("add", "miller", "--role", "official"))
         self.assert_refused(self.run_it("add", "miller", "--role", "viewer"), "already")

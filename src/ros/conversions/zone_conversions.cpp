@@ -224,6 +224,11 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   status.add("web_connections_ended", counters.web_connections_ended);
   status.add("web_connections_refused", counters.web_connections_refused);
   status.add("web_held_bytes", counters.web_held_bytes);
+  if (counters.web_certificate_s) {
+    status.add("web_certificate_days", *counters.web_certificate_s / 86400);
+    status.add("web_certificate_refusal", counters.web_certificate_refusal);
+    status.add("web_failed_handshakes", counters.web_failed_handshakes);
+  }
   status.add("web_pictures_refused", counters.web_pictures_refused);
   status.add("web_pictures_last_refusal", counters.web_pictures_last_refusal);
   status.add("web_pictures_busy", counters.web_pictures_busy);

@@ -67,8 +67,11 @@ struct ZoneCloudletCounters {
   std::uint64_t web_held_bytes = 0;           ///< Of the answers that are being written.
   std::uint64_t web_pictures_refused = 0;     ///< Not accepted when they were to be shown.
   std::string web_pictures_last_refusal;
-  std::uint64_t web_pictures_busy = 0;  ///< Not made: too many waited.
-  std::string store_error;              ///< Of the newest batch; empty when it went well.
+  std::uint64_t web_pictures_busy = 0;      ///< Not made: too many waited.
+  std::uint64_t web_failed_handshakes = 0;  ///< Connections that began TLS in vain.
+  std::optional<double> web_certificate_s;  ///< Until it ends; none: plain HTTP is spoken.
+  std::string web_certificate_refusal;      ///< Of the pair in the files; empty: it is served.
+  std::string store_error;                  ///< Of the newest batch; empty when it went well.
 };
 
 /// Every counter under its own name; an error while the store fails.

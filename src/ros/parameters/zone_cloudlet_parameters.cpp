@@ -57,6 +57,11 @@ void ReadZoneKept(ParameterReader& parameters, zone::ZoneService::Config& zone) 
                   "Size of the pictures on disk. Beyond it pictures that no hazard shows go first, "
                   "then the oldest.",
                   "bytes");
+  parameters.Read(
+      "picture_days", zone.picture_days, {0, 36500},
+      "Pictures are deleted so long after they came, also those that hazards on the map "
+      "show. 0: only image_cap_bytes bounds them.",
+      "days");
   parameters.Read("vehicle_retention_s", zone.vehicle_retention_s, {1, 1e6},
                   "A vehicle that was not heard of for this long is forgotten.", "s");
   parameters.Read(
@@ -315,8 +320,9 @@ void ReadZoneMarkers(ParameterReader& parameters, ZoneCloudletConfig& config) {
 void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
                  ZoneCloudletConfig& config) {
   web::WebConfig& web = config.web_options;
-  parameters.Section(
-      "Live map", "Plain HTTP: before it faces a public network it needs a proxy that speaks TLS.");
+  parameters.Section("Live map",
+                     "Before it faces a public network it needs a certificate, or a proxy that "
+                     "speaks TLS (docs/operations.md).");
   parameters.Read("web", config.web, "Serve the live map. false: no web server.");
   parameters.Read("web_address", web.address,
                   "Address to listen on; 0.0.0.0 serves the whole network. zone.launch sets it by "
@@ -324,6 +330,20 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("web_port", web.port, {0, 65535},
                   "Port to listen on. 0: any free port; the one taken is in the parameter "
                   "/livemap/web_port. zone.launch sets it by the argument `web_port`.");
+  parameters.Read("web_certificate", web.certificate_file,
+                  "PEM file of the server's certificate, and then of those between it and the "
+                  "root: with it the live map is served by HTTPS alone. A newer pair of files is "
+                  "taken within seconds. Empty: plain HTTP. zone.launch sets it by the argument "
+                  "`web_certificate`.");
+  parameters.Read("web_key", web.key_file,
+                  "PEM file of its private key without a password, which others than its owner "
+                  "and group may not read. zone.launch sets it by the argument `web_key`.");
+  parameters.Read("web_http_redirect_port", web.redirect_port, {0, 65535},
+                  "Port at which plain HTTP leads to HTTPS. 0: none.");
+  parameters.Read("web_hsts_s", web.hsts_s, {0, 1e9},
+                  "Time for which a browser that was here by HTTPS asks this host by HTTPS alone, "
+                  "at all its ports (Strict-Transport-Security). 0: it is not told so.",
+                  "s");
   parameters.Read("web_root", web.web_root, "Folder of the page. Empty: web/ of the package.");
   if (web.web_root.empty()) web.web_root = package_path + "/web";
   parameters.Read("leaflet_root", web.leaflet_root, "Folder that holds Debian's leaflet/.");
@@ -340,7 +360,7 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read(
       "web_public_url", web.public_url,
       "Address at which others reach the server, for example https://map.example. Links "
-      "in feeds begin with it. Empty: http:// and the host that the request names.");
+      "in feeds begin with it. Empty: http:// or https:// and the host that the request names.");
   parameters.Read("feed_publisher", web.feed_publisher,
                   "Who publishes the feeds (docs/reference/feeds.md). Empty: web_title.");
   parameters.Read("feed_country", web.feed_country,
@@ -364,7 +384,9 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
                   "all its clients have one address.");
   web.proxies = SplitZoneList(proxies);
   parameters.Read("web_request_timeout_s", web.request_timeout_s, {0.1, 3600},
-                  "Time for a request to arrive, also the longest pause between two.", "s");
+                  "Time for a request to arrive, also the longest pause between two, and the time "
+                  "that a client has to agree on TLS.",
+                  "s");
   parameters.Read("web_answer_timeout_s", web.answer_timeout_s, {0.1, 3600},
                   "Time for a client to take each 32 KiB of an answer.", "s");
   parameters.Read("web_picture_timeout_s", web.picture_timeout_s, {0.1, 3600},

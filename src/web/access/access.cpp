@@ -124,7 +124,8 @@ Visibility Access::VisibilityFor(const HttpRequest& question) const {
 
 std::optional<HttpResponse> Access::WhyForged(const HttpRequest& question,
                                               const std::string& session_token) const {
-  if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins)) {
+  const bool only_https = !options_.certificate_file.empty();
+  if (!IsAllowedOrigin(question.origin, question.host, options_.allowed_origins, only_https)) {
     return MakeErrorAnswer(403, "pages of another origin may not decide anything");
   }
   const bool changes_something = question.method != "GET" && question.method != "HEAD";
@@ -165,6 +166,23 @@ std::optional<HttpResponse> Access::WhyNotOfficial(const HttpRequest& question,
       break;
   }
   return TooMany("too many wrong tokens came from your address, try again in a minute");
+}
+
+std::optional<HttpResponse> Access::WhyNotAdmin(const HttpRequest& question,
+                                                std::string& admin) const {
+  const auto person = PersonOf(question);
+  if (!person) return Unauthorized("log in as an admin");
+  if (auto forged = WhyForged(question, SessionToken(question))) return forged;
+  if (person->role < accounts::Role::kAdmin) {
+    return MakeErrorAnswer(403, "only an admin may see and change accounts");
+  }
+  admin = person->name;
+  return std::nullopt;
+}
+
+void Access::Note(accounts::AccountEventKind kind, const std::string& name,
+                  const HttpRequest& question) {
+  accounts_->Note({0, kind, name, name, question.client, SystemNs()});
 }
 
 bool Access::MayTryPassword(const std::string& client, const std::string& name) const {
@@ -210,9 +228,13 @@ HttpResponse Access::LogIn(const HttpRequest& question) {
   const auto person = accounts_->CheckPassword(body->name, body->password);
   if (!person) {
     CountWrongPassword(question.client, counted);
+    // A name that is none is not written down: it may be a password in the wrong field.
+    const bool is_name = accounts_->Has(body->name);
+    Note(accounts::AccountEventKind::kWrongPassword, is_name ? body->name : "", question);
     return Unauthorized("the name or the password is wrong");
   }
   const std::string token = accounts_->OpenSession(person->name, SystemNs());
+  Note(accounts::AccountEventKind::kLogIn, person->name, question);
   HttpResponse answer = JsonAnswer(PersonJson(*person, token));
   answer.headers.emplace_back("Set-Cookie", Cookie(token, options_.session_s));
   return answer;
@@ -220,9 +242,11 @@ HttpResponse Access::LogIn(const HttpRequest& question) {
 
 HttpResponse Access::LogOut(const HttpRequest& question) {
   const std::string token = SessionToken(question);
-  if (!PersonOf(question)) return Unauthorized("nobody has logged in");
+  const auto person = PersonOf(question);
+  if (!person) return Unauthorized("nobody has logged in");
   if (auto forged = WhyForged(question, token)) return *std::move(forged);
   accounts_->CloseSession(token);
+  Note(accounts::AccountEventKind::kLogOut, person->name, question);
   HttpResponse answer = JsonAnswer({{"name", nullptr}});
   answer.headers.emplace_back("Set-Cookie", Cookie("", 0));
   return answer;

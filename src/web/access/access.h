@@ -39,6 +39,12 @@ class Access {
   /// None where the request may decide something in the name of `official`, else the refusal.
   std::optional<HttpResponse> WhyNotOfficial(const HttpRequest& question, std::string& official);
 
+  /// None where the request may do in the name of `admin` what is about the zone itself, else the
+  /// refusal: only somebody who has logged in may, no program by a token.
+  std::optional<HttpResponse> WhyNotAdmin(const HttpRequest& question, std::string& admin) const;
+  /// Null where the zone keeps no accounts.
+  accounts::AccountStore* accounts() { return accounts_ ? &*accounts_ : nullptr; }
+
   /// `POST /api/v1/session` with `{"name", "password"}`: opens a session, whose cookie it sets.
   HttpResponse LogIn(const HttpRequest& question);
   /// `DELETE /api/v1/session`: closes it.
@@ -56,6 +62,8 @@ class Access {
   std::string SessionToken(const HttpRequest& question) const;
   /// The cookie of a session, or of none any more.
   std::string Cookie(const std::string& token, double lasts_s) const;
+  /// Into the trail of log-ins: what the account's owner did, or somebody in its name.
+  void Note(accounts::AccountEventKind kind, const std::string& name, const HttpRequest& question);
   bool MayTryPassword(const std::string& client, const std::string& name) const;
   void CountWrongPassword(const std::string& client, const std::string& name);
   /// Refuses pages of other origins, and forged requests of a session.

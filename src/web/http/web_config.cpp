@@ -28,6 +28,26 @@ void RequireAddress(const std::string& option, const std::string& address) {
   }
 }
 
+void ValidateTls(const WebConfig& options) {
+  if (options.certificate_file.empty() != options.key_file.empty()) {
+    throw Error("web_certificate is '" + options.certificate_file + "' and web_key is '" +
+                options.key_file + "', accepted are two files or none");
+  }
+  if (options.redirect_port < 0 || options.redirect_port > 65535) {
+    throw Error("web_http_redirect_port is " + std::to_string(options.redirect_port) +
+                ", accepted is 0 to 65535");
+  }
+  if (options.redirect_port == 0) return;
+  if (options.certificate_file.empty()) {
+    throw Error("web_http_redirect_port is " + std::to_string(options.redirect_port) +
+                ", accepted is 0 where web_certificate is empty");
+  }
+  if (options.redirect_port == options.port) {
+    throw Error("web_http_redirect_port is " + std::to_string(options.redirect_port) +
+                ", which is web_port, accepted is another port");
+  }
+}
+
 /// They stand in every feed.
 void ValidateFeeds(const WebConfig& options) {
   static const std::regex kUrl("https?://[A-Za-z0-9._~:/%\\[\\]-]+");
@@ -74,6 +94,7 @@ void Validate(const WebConfig& options) {
     throw Error("tile_url is '" + options.tile_url + "' and the file of tiles is '" +
                 options.tile_file + "', accepted is one of the two");
   }
+  ValidateTls(options);
   ValidateFeeds(options);
   if (!geo::IsValid(options.centre)) {
     throw Error("centre is " + std::to_string(options.centre.latitude_deg) + ", " +
@@ -95,6 +116,10 @@ void Validate(const WebConfig& options) {
   RequirePositive("request_timeout_s", options.request_timeout_s);
   RequirePositive("answer_timeout_s", options.answer_timeout_s);
   RequirePositive("picture_timeout_s", options.picture_timeout_s);
+  RequirePositive("certificate_check_s", options.certificate_check_s);
+  if (!(options.hsts_s >= 0 && options.hsts_s < 1e9)) {
+    throw Error("hsts_s is " + std::to_string(options.hsts_s) + ", accepted is 0 to 1e9");
+  }
   RequirePositive("ping_timeout_s", options.ping_timeout_s);
   RequirePositive("heartbeat_s", options.heartbeat_s);
   RequirePositive("max_queued_messages", static_cast<double>(options.max_queued_messages));

@@ -19,7 +19,15 @@ enum class PublicSees {
 struct WebConfig {
   std::string address = "127.0.0.1";  ///< Where to listen; "0.0.0.0" serves the whole network.
   int port = 8080;                    ///< 0 takes any free port.
-  std::string web_root;               ///< Folder of the page (index.html).
+  /// PEM files of the server's certificate and its private key (TlsCertificate). Both empty: plain
+  /// HTTP is spoken.
+  std::string certificate_file;
+  std::string key_file;
+  double certificate_check_s = 2;  ///< Between two looks at these files.
+  /// Browsers are told to ask this host by HTTPS alone for so long (HSTS, RFC 6797); 0: never told.
+  double hsts_s = 365 * 86400.0;
+  int redirect_port = 0;                               ///< Plain HTTP that leads to HTTPS; 0: none.
+  std::string web_root;                                ///< Folder of the page (index.html).
   std::string leaflet_root = "/usr/share/javascript";  ///< Holds Debian's leaflet/.
   std::string tile_url;          ///< E.g. "https://tiles.example/{z}/{x}/{y}.png"; empty: offline.
   std::string tile_attribution;  ///< Plain text; most tile providers require it.

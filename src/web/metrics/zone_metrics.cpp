@@ -106,6 +106,13 @@ void AddServer(MetricsText& text, const ServerMetrics& server) {
          static_cast<double>(server.connections_refused));
   AddOne(text, "livemap_web_held_bytes", kGauge, "Of answers that are being written.",
          static_cast<double>(server.held_bytes));
+  if (server.certificate_ends_ns) {
+    AddOne(text, "livemap_web_certificate_seconds", kGauge,
+           "Time until the certificate of the web server ends; below 0: since it ended.",
+           Seconds(*server.certificate_ends_ns - SystemNs()));
+    AddOne(text, "livemap_web_failed_handshakes_total", kCounter,
+           "Connections that began TLS in vain.", static_cast<double>(server.failed_handshakes));
+  }
   text.Begin("livemap_web_answer_seconds", "histogram",
              "Time until an answer begins, without pictures.");
   text.Add(server.answers);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "common/histogram.h"
@@ -16,6 +17,8 @@ struct ServerMetrics {
   std::uint64_t connections_ended = 0;
   std::uint64_t connections_refused = 0;
   std::uint64_t held_bytes = 0;
+  std::uint64_t failed_handshakes = 0;
+  std::optional<std::int64_t> certificate_ends_ns;  ///< None: plain HTTP is spoken.
   DurationHistogram::Counts answers;  ///< Time from a request to its answer, without pictures.
 };
 

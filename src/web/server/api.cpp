@@ -55,6 +55,7 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       catalogue_(catalogue),
       trails_(trails),
       access_(options_),
+      accounts_(access_),
       officials_(access_, zone, catalogue),
       hazards_(zone, catalogue),
       map_changes_(zone),
@@ -163,6 +164,7 @@ HttpResponse Api::AnswerGet(const HttpRequest& question) {
     return officials_.Preview(*decision, question);
   }
   if (OrderApi::IsAddress(target.path)) return orders_.Answer(target, question);
+  if (AccountApi::IsAddress(target.path)) return accounts_.Answer(target, question);
   HttpResponse answer = Route(target, question);
   answer.by_official = access_.CheckOfficial(question);
   return answer;
@@ -177,6 +179,7 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     return officials_.Decide(*decision, question);
   }
   if (OrderApi::IsAddress(target.path)) return orders_.Answer(target, question);
+  if (AccountApi::IsAddress(target.path)) return accounts_.Answer(target, question);
   if (target.path == kSessionAddress) {
     RefuseQueryParameters(target);
     if (question.method == "POST") return access_.LogIn(question);

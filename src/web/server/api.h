@@ -11,6 +11,7 @@
 #include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/access/access.h"
+#include "web/access/account_api.h"
 #include "web/api/feed_api.h"
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
@@ -89,6 +90,7 @@ class Api : public Site {
   const protocol::HazardCatalogue& catalogue_;
   const VehicleTrails& trails_;
   Access access_;
+  AccountApi accounts_;
   OfficialApi officials_;
   const HazardApi hazards_;
   const MapChangeApi map_changes_;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "web/http/site.h"
 #include "web/http/web_config.h"
 #include "web/server/connection_table.h"
+#include "web/server/tls_certificate.h"
 #include "web/server/work_queue.h"
 
 namespace livemap::web {
@@ -32,6 +34,9 @@ struct WebContext {
   /// Makes answers, so that the threads that read and write sockets never wait for the store.
   WorkQueue& work;
   const TrustedProxies& proxies;
+  const TlsCertificate* certificate = nullptr;  ///< None: plain HTTP is spoken.
+  int https_port = 0;                           ///< Where HTTPS is spoken; 0: nowhere.
+  std::atomic<std::uint64_t> failed_handshakes{0};
   std::atomic<std::size_t> held_bytes{0};  ///< Of the answers that are being written.
 };
 

@@ -6,6 +6,8 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/strand.hpp>
 #include <chrono>
+#include <deque>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -31,21 +33,33 @@ ConnectionTable::Config TableConfig(const WebConfig& options, const TrustedProxi
   return config;
 }
 
+std::unique_ptr<TlsCertificate> CertificateOf(const WebConfig& options) {
+  if (options.certificate_file.empty()) return nullptr;
+  return std::make_unique<TlsCertificate>(options.certificate_file, options.key_file);
+}
+
 }  // namespace
 
 class HttpServer::Implementation {
  public:
   Implementation(const WebConfig& options, Site& site, const LiveSource* live)
       : options_(options),
+        certificate_(CertificateOf(options_)),
         proxies_(options_.proxies),
         table_(TableConfig(options_, proxies_)),
-        context_{options_, site, live, table_, work_, proxies_},
+        context_{options_, site, live, table_, work_, proxies_, certificate_.get()},
         work_(options_.threads),
         accept_strand_(net::make_strand(io_)),
-        acceptor_(accept_strand_),
-        accept_pause_(accept_strand_) {
-    Listen();
-    Accept();
+        certificate_check_(accept_strand_) {
+    AddPort(options_.port, certificate_ ? HttpSession::Speech::kTls : HttpSession::Speech::kPlain);
+    if (certificate_) {
+      context_.https_port = port();
+      CheckCertificateLater();
+    }
+    if (options_.redirect_port != 0) {
+      AddPort(options_.redirect_port, HttpSession::Speech::kRedirect);
+    }
+    for (Port& opened : ports_) Accept(opened);
     for (int i = 0; i < options_.threads; ++i) {
       threads_.emplace_back([this] { io_.run(); });
     }
@@ -57,47 +71,74 @@ class HttpServer::Implementation {
     work_.Stop();
   }
 
-  int port() const { return port_; }
+  int port() const { return ports_.front().number; }
+  std::optional<CertificateState> certificate() const {
+    return certificate_ ? std::optional(certificate_->state()) : std::nullopt;
+  }
   std::size_t connections() const { return table_.size(); }
-  Counters counters() const { return {table_.ended(), table_.refused(), context_.held_bytes}; }
+  Counters counters() const {
+    return {table_.ended(), table_.refused(), context_.held_bytes, context_.failed_handshakes};
+  }
 
  private:
-  void Listen() {
+  /// A port that the server listens on.
+  struct Port {
+    Port(const net::strand<net::io_context::executor_type>& strand, HttpSession::Speech spoken)
+        : speech(spoken), acceptor(strand), pause(strand) {}
+    const HttpSession::Speech speech;
+    int number = 0;
+    tcp::acceptor acceptor;
+    net::steady_timer pause;
+  };
+
+  void AddPort(int number, HttpSession::Speech speech) {
     error_code failure;
     const auto address = net::ip::make_address(options_.address, failure);
     if (failure) {
       throw Error("address is '" + options_.address + "', accepted is an IPv4 or IPv6 address");
     }
-    const tcp::endpoint endpoint(address, static_cast<unsigned short>(options_.port));
-    acceptor_.open(endpoint.protocol(), failure);
-    if (!failure) acceptor_.set_option(net::socket_base::reuse_address(true), failure);
-    if (!failure) acceptor_.bind(endpoint, failure);
-    if (!failure) acceptor_.listen(net::socket_base::max_listen_connections, failure);
+    Port& port = ports_.emplace_back(accept_strand_, speech);
+    const tcp::endpoint endpoint(address, static_cast<unsigned short>(number));
+    port.acceptor.open(endpoint.protocol(), failure);
+    if (!failure) port.acceptor.set_option(net::socket_base::reuse_address(true), failure);
+    if (!failure) port.acceptor.bind(endpoint, failure);
+    if (!failure) port.acceptor.listen(net::socket_base::max_listen_connections, failure);
     if (failure) {
       throw Error("the web server cannot listen on " + options_.address + ", port " +
-                  std::to_string(options_.port) + ": " + failure.message());
+                  std::to_string(number) + ": " + failure.message());
     }
-    port_ = acceptor_.local_endpoint().port();
+    port.number = port.acceptor.local_endpoint().port();
   }
 
-  void Accept() {
-    acceptor_.async_accept(net::make_strand(io_), [this](error_code failure, tcp::socket socket) {
-      if (failure == net::error::operation_aborted) return;
-      if (failure) return PauseAccepting();
-      Serve(std::move(socket));
-      Accept();
-    });
+  void Accept(Port& port) {
+    port.acceptor.async_accept(net::make_strand(io_),
+                               [this, &port](error_code failure, tcp::socket socket) {
+                                 if (failure == net::error::operation_aborted) return;
+                                 if (failure) return PauseAccepting(port);
+                                 Serve(std::move(socket), port.speech);
+                                 Accept(port);
+                               });
   }
 
   /// Out of file descriptors, most likely: trying at once would only spin.
-  void PauseAccepting() {
-    accept_pause_.expires_after(std::chrono::milliseconds(100));
-    accept_pause_.async_wait([this](error_code failure) {
-      if (!failure) Accept();
+  void PauseAccepting(Port& port) {
+    port.pause.expires_after(std::chrono::milliseconds(100));
+    port.pause.async_wait([this, &port](error_code failure) {
+      if (!failure) Accept(port);
     });
   }
 
-  void Serve(tcp::socket socket) {
+  void CheckCertificateLater() {
+    const auto period_ms = static_cast<std::int64_t>(options_.certificate_check_s * 1000);
+    certificate_check_.expires_after(std::chrono::milliseconds(period_ms));
+    certificate_check_.async_wait([this](error_code failure) {
+      if (failure) return;
+      certificate_->Reload(SystemNs());
+      CheckCertificateLater();
+    });
+  }
+
+  void Serve(tcp::socket socket, HttpSession::Speech speech) {
     error_code ignored;
     const auto peer = socket.remote_endpoint(ignored).address();
     std::string client = ignored ? "" : proxies_.ClientOf(peer);
@@ -106,6 +147,8 @@ class HttpServer::Implementation {
       static constexpr char kBusy[] =
           "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\nRetry-After: 1\r\n"
           "Connection: close\r\n\r\n";
+      // Who begins with TLS would not read it.
+      if (speech == HttpSession::Speech::kTls) return;
       socket.non_blocking(true, ignored);
       socket.write_some(net::buffer(kBusy, sizeof(kBusy) - 1), ignored);
       return;
@@ -117,20 +160,21 @@ class HttpServer::Implementation {
           net::socket_base::send_buffer_size(static_cast<int>(options_.socket_send_buffer_bytes)),
           ignored);
     }
-    std::make_shared<HttpSession>(std::move(socket), std::move(slot), std::move(client))->Start();
+    std::make_shared<HttpSession>(std::move(socket), std::move(slot), std::move(client), speech)
+        ->Start();
   }
 
   // The order matters: sessions, which io_ destroys with its pending work, use all above it.
   const WebConfig options_;
+  const std::unique_ptr<TlsCertificate> certificate_;  ///< Null: plain HTTP is spoken.
   const TrustedProxies proxies_;
   ConnectionTable table_;
   WebContext context_;
   net::io_context io_;
   WorkQueue work_;
   net::strand<net::io_context::executor_type> accept_strand_;
-  tcp::acceptor acceptor_;
-  net::steady_timer accept_pause_;
-  int port_ = 0;
+  std::deque<Port> ports_;  ///< The first one is the server's own.
+  net::steady_timer certificate_check_;
   std::vector<std::thread> threads_;
 };
 
@@ -142,6 +186,10 @@ HttpServer::~HttpServer() = default;
 int HttpServer::port() const { return implementation_->port(); }
 
 HttpServer::Counters HttpServer::counters() const { return implementation_->counters(); }
+
+std::optional<CertificateState> HttpServer::certificate() const {
+  return implementation_->certificate();
+}
 
 std::size_t HttpServer::connections() const { return implementation_->connections(); }
 

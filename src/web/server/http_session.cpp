@@ -5,6 +5,7 @@
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/core/detect_ssl.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "web/access/access.h"
 #include "web/api/query.h"
 #include "web/http/origin.h"
+#include "web/http/server_address.h"
 #include "web/server/websocket_session.h"
 
 namespace livemap::web {
@@ -71,9 +73,10 @@ bool IsLoopback(const boost::asio::ip::tcp::socket& socket) {
 }  // namespace
 
 HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, ConnectionSlot slot,
-                         std::string client)
+                         std::string client, Speech speech)
     : stream_(std::move(socket)),
       slot_(std::move(slot)),
+      speech_(speech),
       peer_(std::move(client)),
       client_(peer_),
       buffer_(kMaxReadAheadBytes),
@@ -88,8 +91,37 @@ void HttpSession::Start() {
       if (const auto self = weak.lock()) self->Close();
     });
   });
-  boost::asio::dispatch(stream_.get_executor(),
-                        [self = shared_from_this()] { self->ReadRequest(); });
+  boost::asio::dispatch(stream_.get_executor(), [self = shared_from_this()] {
+    if (self->speech_ == Speech::kTls) return self->DetectTls();
+    self->ReadRequest();
+  });
+}
+
+void HttpSession::DetectTls() {
+  tcp().expires_after(Milliseconds(context().options.request_timeout_s));
+  beast::async_detect_ssl(tcp(), buffer_,
+                          [self = shared_from_this()](beast::error_code failure, bool is_tls) {
+                            if (failure) return self->Close();
+                            if (is_tls) return self->ShakeHands();
+                            self->speech_ = Speech::kRedirect;
+                            self->ReadRequest();
+                          });
+}
+
+/// In as much time as its first bytes had.
+void HttpSession::ShakeHands() {
+  const auto tls = context().certificate->context();
+  stream_.StartTls(*tls);
+  tcp().expires_after(Milliseconds(context().options.request_timeout_s));
+  stream_.async_handshake(buffer_.data(),
+                          [self = shared_from_this()](beast::error_code failure, std::size_t) {
+                            // A client has nothing to say behind its greeting before it was
+                            // answered.
+                            self->buffer_.clear();
+                            if (!failure) return self->ReadRequest();
+                            ++self->context().failed_handshakes;
+                            self->Close();
+                          });
 }
 
 void HttpSession::SetPhase(ConnectionTable::Phase phase) {
@@ -109,7 +141,7 @@ void HttpSession::ReadRequest() {
   parser_.emplace();
   parser_->header_limit(static_cast<std::uint32_t>(kMaxHeaderBytes));
   parser_->body_limit(kMaxBodyBytes);
-  stream_.expires_after(Milliseconds(context().options.request_timeout_s));
+  tcp().expires_after(Milliseconds(context().options.request_timeout_s));
   http::async_read_header(stream_, buffer_, *parser_,
                           [self = shared_from_this()](beast::error_code failure, std::size_t) {
                             self->OnHeader(failure);
@@ -134,10 +166,11 @@ void HttpSession::OnHeader(beast::error_code failure) {
   form_.keep_alive = request.version() >= 11 && request.keep_alive();
   if (context().proxies.names().count(peer_) != 0) {
     beast::error_code gone;
-    const auto endpoint = stream_.socket().remote_endpoint(gone);
+    const auto endpoint = tcp().socket().remote_endpoint(gone);
     if (gone) return Close();
     SetClient(context().proxies.ClientOf(endpoint.address(), ForwardedFor(request)));
   }
+  if (speech_ == Speech::kRedirect) return Refuse(RedirectToHttps(request));
   form_.gzip = AcceptsGzip(Field(request, http::field::accept_encoding));
   // On the reserve only officials are served, and whoever watches over the zone. Whether a token is
   // an official's is seen with the answer.
@@ -195,7 +228,7 @@ void HttpSession::AnswerRequest() {
 }
 
 bool HttpSession::HasPlace(bool is_health) {
-  const bool is_local = client_ == peer_ && IsLoopback(stream_.socket());
+  const bool is_local = client_ == peer_ && IsLoopback(tcp().socket());
   return (is_health && is_local) || context().table.MayServe(slot_.id());
 }
 
@@ -244,12 +277,12 @@ bool HttpSession::UpgradeToStream(const Request& request) {
     }
     const bool may_open =
         IsAllowedOrigin(Field(request, http::field::origin), Field(request, http::field::host),
-                        context().options.allowed_origins);
+                        context().options.allowed_origins, stream_.is_tls());
     // A token that nobody has looked at yet holds no place on the reserve.
     const bool has_place = may_open && context().table.MayServe(slot_.id()) &&
                            context().table.BecomeStream(slot_.id(), SteadyNs());
     if (has_place) {
-      stream_.expires_never();
+      tcp().expires_never();
       std::make_shared<WebSocketSession>(std::move(stream_), std::move(slot_), *live,
                                          std::move(question), since)
           ->Start(request);
@@ -265,6 +298,19 @@ bool HttpSession::UpgradeToStream(const Request& request) {
   return true;
 }
 
+HttpResponse HttpSession::RedirectToHttps(const Request& request) const {
+  HttpResponse answer = MakeErrorAnswer(400, "this port speaks HTTPS only");
+  const std::string target(request.target());
+  const bool is_read = request.method() == http::verb::get || request.method() == http::verb::head;
+  if (!is_read || target.empty() || target.front() != '/') return answer;
+  const std::string address =
+      HttpsAddress(context().options, Field(request, http::field::host), context().https_port);
+  if (address.empty()) return answer;
+  answer = MakeErrorAnswer(308, "this is served by HTTPS");
+  answer.headers.emplace_back("Location", address + target);
+  return answer;
+}
+
 void HttpSession::Refuse(HttpResponse answer) {
   form_.keep_alive = false;
   Begin(std::move(answer));
@@ -272,6 +318,10 @@ void HttpSession::Refuse(HttpResponse answer) {
 }
 
 void HttpSession::Begin(HttpResponse answer) {
+  const auto hsts_s = static_cast<std::int64_t>(context().options.hsts_s);
+  if (stream_.is_tls() && hsts_s > 0) {
+    answer.headers.emplace_back("Strict-Transport-Security", "max-age=" + std::to_string(hsts_s));
+  }
   writer_ = std::make_unique<AnswerWriter>(std::move(answer), form_);
   const std::size_t wanted = writer_->HeldBytes();
   held_bytes_ = wanted;
@@ -305,11 +355,11 @@ void HttpSession::WriteAfter(WorkQueue::Job job) {
 void HttpSession::WritePart() {
   if (!writer_) return Close();
   if (part_.empty() && !writer_->IsDone()) {
-    if (!stream_.socket().is_open()) return;  // Ended meanwhile: nobody waits for more.
+    if (!tcp().socket().is_open()) return;  // Ended meanwhile: nobody waits for more.
     return WriteAfter([this] { MakePart(); });
   }
   SetPhase(ConnectionTable::Phase::kWriting);
-  stream_.expires_after(Milliseconds(context().options.answer_timeout_s));
+  tcp().expires_after(Milliseconds(context().options.answer_timeout_s));
   boost::asio::async_write(stream_, boost::asio::buffer(part_),
                            [self = shared_from_this()](beast::error_code failure, std::size_t) {
                              self->OnPartWritten(failure);
@@ -341,27 +391,28 @@ void HttpSession::ReleaseHeld() {
 void HttpSession::CloseGently() {
   // First: the client may come again as soon as it sees the end, and this place is free for it.
   SetPhase(ConnectionTable::Phase::kLeaving);
-  beast::error_code ignored;
-  stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
-  stream_.expires_after(kDrainTime);
-  Drain();
+  tcp().expires_after(kDrainTime);
+  stream_.async_end([self = shared_from_this()](beast::error_code failure) {
+    if (failure) return self->Close();
+    self->Drain();
+  });
 }
 
 void HttpSession::Drain() {
   buffer_.clear();
-  stream_.async_read_some(
-      buffer_.prepare(kMaxReadAheadBytes),
-      [self = shared_from_this()](beast::error_code failure, std::size_t bytes) {
-        self->drained_bytes_ += bytes;
-        if (failure || self->drained_bytes_ > kMaxDrainedBytes) return self->Close();
-        self->Drain();
-      });
+  tcp().async_read_some(buffer_.prepare(kMaxReadAheadBytes),
+                        [self = shared_from_this()](beast::error_code failure, std::size_t bytes) {
+                          self->drained_bytes_ += bytes;
+                          if (failure || self->drained_bytes_ > kMaxDrainedBytes)
+                            return self->Close();
+                          self->Drain();
+                        });
 }
 
 void HttpSession::Close() {
   if (!slot_.is_held()) return;  // The connection is a live stream's now.
   SetPhase(ConnectionTable::Phase::kLeaving);
-  stream_.close();
+  tcp().close();
 }
 
 }  // namespace livemap::web

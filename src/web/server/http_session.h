@@ -11,6 +11,7 @@
 
 #include "web/http/answer_writer.h"
 #include "web/server/connection.h"
+#include "web/server/connection_stream.h"
 
 namespace livemap::web {
 
@@ -21,10 +22,21 @@ namespace livemap::web {
 /// Requests are answered one after the other, also when a client sends several at once. Answers are
 /// made on the context's working threads, a piece at a time: between two pieces other clients have
 /// their turn. Nothing is made before what was made is written.
+///
+/// Where the connection speaks TLS, its handshake must be done in the time of a request. Whoever
+/// begins in plain text there is sent to the address by HTTPS.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
+  /// What the port speaks.
+  enum class Speech {
+    kPlain,
+    kTls,
+    kRedirect  ///< Plain text, and nothing but where the same is by HTTPS.
+  };
+
   /// `client`: TrustedProxies::ClientOf the other end of the socket.
-  HttpSession(boost::asio::ip::tcp::socket socket, ConnectionSlot slot, std::string client);
+  HttpSession(boost::asio::ip::tcp::socket socket, ConnectionSlot slot, std::string client,
+              Speech speech);
   ~HttpSession();
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
@@ -33,6 +45,9 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
  private:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
+  /// Looks whether the client begins with TLS.
+  void DetectTls();
+  void ShakeHands();
   void ReadRequest();
   void OnHeader(boost::beast::error_code failure);
   void ReadBody();
@@ -51,6 +66,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void AnswerUnreadable(boost::beast::error_code failure);
   /// True when the request was for the live stream and the connection has left this session.
   bool UpgradeToStream(const Request& request);
+  /// Where the request that came in plain text is by HTTPS.
+  HttpResponse RedirectToHttps(const Request& request) const;
   /// An answer that needs no work: an error.
   void Refuse(HttpResponse answer);
   /// Makes the writer, or one that says that the server is busy. Any thread.
@@ -68,10 +85,13 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
   void CloseGently();
   void Drain();
   void Close();
+  boost::beast::tcp_stream& tcp() { return stream_.next_layer(); }
+  const boost::beast::tcp_stream& tcp() const { return stream_.next_layer(); }
   WebContext& context() const { return slot_.context(); }
 
-  boost::beast::tcp_stream stream_;
+  ConnectionStream stream_;
   ConnectionSlot slot_;
+  Speech speech_;           ///< kRedirect, too, of who begins in plain text where TLS is spoken.
   const std::string peer_;  ///< The other end of the socket: a client, or a proxy.
   std::string client_;      ///< Whose request it is: work and wrong tokens count against it.
   WorkQueue::Rank rank_ = WorkQueue::Rank::kReader;  ///< Of the request that is being answered.

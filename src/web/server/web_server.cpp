@@ -8,6 +8,14 @@
 
 namespace livemap::web {
 
+namespace {
+
+std::optional<std::int64_t> CertificateEnd(const std::optional<CertificateState>& certificate) {
+  return certificate ? std::optional(certificate->ends_ns) : std::nullopt;
+}
+
+}  // namespace
+
 class WebServer::Implementation {
  public:
   Implementation(const Options& options, zone::ZoneService& zone,
@@ -22,6 +30,8 @@ class WebServer::Implementation {
                            counted.connections_ended,
                            counted.connections_refused,
                            counted.held_bytes,
+                           counted.failed_handshakes,
+                           CertificateEnd(server_.certificate()),
                            {}};
     });
   }
@@ -56,7 +66,11 @@ int WebServer::port() const { return implementation_->server().port(); }
 WebServer::Counters WebServer::counters() const {
   const HttpServer::Counters of_server = implementation_->server().counters();
   return {of_server.connections_ended, of_server.connections_refused, of_server.held_bytes,
-          implementation_->api().picture_counters()};
+          of_server.failed_handshakes, implementation_->api().picture_counters()};
+}
+
+std::optional<CertificateState> WebServer::certificate() const {
+  return implementation_->server().certificate();
 }
 
 std::size_t WebServer::connections() const { return implementation_->server().connections(); }

@@ -2,17 +2,20 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "protocol/hazard_catalogue.h"
 #include "web/http/web_config.h"
 #include "web/server/api.h"
+#include "web/server/tls_certificate.h"
 #include "zone/service/zone_service.h"
 
 namespace livemap::web {
 
 /// The zone's web server: the live map's page, its API and its live stream
 /// (docs/reference/http-api.md).
-/// Plain HTTP: in front of a public network stands a proxy that speaks TLS and asks who is there.
+/// It speaks HTTPS where its options name a certificate; else, in front of a public network, stands
+/// a proxy that does.
 class WebServer {
  public:
   using Options = WebConfig;
@@ -36,9 +39,12 @@ class WebServer {
     std::uint64_t connections_ended = 0;    ///< For others that needed their place.
     std::uint64_t connections_refused = 0;  ///< There was no place.
     std::uint64_t held_bytes = 0;           ///< Of the answers that are being written now.
+    std::uint64_t failed_handshakes = 0;    ///< Connections that began TLS in vain.
     Api::PictureCounters pictures;
   };
   Counters counters() const;
+  /// None where plain HTTP is spoken.
+  std::optional<CertificateState> certificate() const;
 
  private:
   class Implementation;

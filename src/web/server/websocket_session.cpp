@@ -27,7 +27,7 @@ std::shared_ptr<const std::string> Shared(const Json& json) {
 
 }  // namespace
 
-WebSocketSession::WebSocketSession(beast::tcp_stream stream, ConnectionSlot slot,
+WebSocketSession::WebSocketSession(ConnectionStream stream, ConnectionSlot slot,
                                    const LiveSource& live, HttpRequest upgrade,
                                    std::optional<std::uint64_t> since)
     : slot_(std::move(slot)),

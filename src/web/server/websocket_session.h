@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "web/server/connection.h"
+#include "web/server/connection_stream.h"
 
 namespace livemap::web {
 
@@ -30,7 +31,7 @@ class WebSocketSession : public LiveListener,
 
   /// Without `since` the client is told only what happens from now on.
   /// `upgrade` is who asked: what it may see is looked up again as long as the stream lives.
-  WebSocketSession(boost::beast::tcp_stream stream, ConnectionSlot slot, const LiveSource& live,
+  WebSocketSession(ConnectionStream stream, ConnectionSlot slot, const LiveSource& live,
                    HttpRequest upgrade, std::optional<std::uint64_t> since);
 
   void Start(const Request& upgrade);
@@ -69,7 +70,7 @@ class WebSocketSession : public LiveListener,
   const LiveSource& live_;
   const HttpRequest upgrade_;
   const Visibility sees_;
-  boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
+  boost::beast::websocket::stream<ConnectionStream> stream_;
   boost::asio::steady_timer close_deadline_;
   boost::asio::steady_timer heartbeat_;
   boost::beast::flat_buffer read_buffer_;

@@ -96,6 +96,8 @@ TEST(Origin, OnlyOwnAndListedPagesMayOpenTheStream) {
   EXPECT_FALSE(IsAllowedOrigin("null", "map.example:8080", {}));
   EXPECT_FALSE(IsAllowedOrigin("http://", "", {}));
   EXPECT_TRUE(IsAllowedOrigin("https://city.example", "map:1", {"https://city.example"}));
+  EXPECT_TRUE(IsAllowedOrigin("https://map.example", "map.example", {}, true));
+  EXPECT_FALSE(IsAllowedOrigin("http://map.example", "map.example", {}, true));
 }
 
 TEST(TileSource, AdmitsOnlyTheTilesHost) {

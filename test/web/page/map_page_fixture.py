@@ -86,7 +86,7 @@ def street(start=(LAT, LON), length=150, turn=60):
     return points
 
 
-def start_browser(width, height, dark=False):
+def start_browser(width, height, dark=False, flags=()):
     profile = tempfile.mkdtemp(prefix="livemap_chromium_")
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium")
@@ -94,7 +94,7 @@ def start_browser(width, height, dark=False):
                  "--no-first-run", "--disable-background-networking",
                  "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
                  "--disable-extensions", "--hide-scrollbars", f"--user-data-dir={profile}",
-                 f"--window-size={width},{height}"):
+                 f"--window-size={width},{height}", *flags):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)

@@ -1,7 +1,7 @@
 // A real zone and its real web server for the browser tests and for pictures of the page. Its
-// arguments, if any, are the zone's street file, a file of tiles and a folder for the store, which
-// stays; empty ones count as none. It takes one JSON command per line on standard input and answers
-// each with one line of JSON:
+// arguments, if any, are the zone's street file, a file of tiles, a folder for the store, which
+// stays, and the files of a certificate and its key; empty ones count as none. It takes one JSON
+// command per line on standard input and answers each with one line of JSON:
 //
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
 //                                                                       -> {"id", "status",
@@ -21,6 +21,8 @@
 //   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
 //   {"do": "connections"}                                               -> {"connections"}
+//   {"do": "certificate"}                   how many were taken since the server's start ->
+//   {"loads"}
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -29,6 +31,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -39,6 +42,7 @@
 #include "common/error.h"
 #include "streets/street_file.h"
 #include "test/web/zone_fixture.h"
+#include "zone/service/erasure_desk.h"
 
 namespace {
 
@@ -79,11 +83,17 @@ constexpr char kPassword[] = "correct horse battery";
 class Session {
  public:
   Session(std::shared_ptr<const livemap::streets::StreetMap> streets, std::string tile_file,
-          const std::string& directory)
+          const std::string& directory, std::string certificate_file, std::string key_file)
       : fixture_(std::move(streets), directory) {
     options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
     options_.tile_file = std::move(tile_file);
+    options_.certificate_file = std::move(certificate_file);
+    options_.key_file = std::move(key_file);
+    options_.certificate_check_s = 0.05;
+    if (!directory.empty()) {
+      erasures_.emplace(directory, *fixture_.zone, livemap::SystemNs, [](const std::string&) {});
+    }
     Start();
   }
 
@@ -104,6 +114,7 @@ class Session {
     if (verb == "row") return AddToldRow(command);
     if (verb == "vehicle") return MoveVehicle(command);
     if (verb == "start") return Start();
+    if (verb == "certificate") return {{"loads", server_->certificate().value().loads}};
     if (verb == "connections") return {{"connections", server_->connections()}};
     if (verb != "stop") throw livemap::Error("unknown command '" + verb + "'");
     server_.reset();
@@ -268,6 +279,7 @@ class Session {
   livemap::web::TemporaryFolder accounts_folder_;
   int account_files_ = 0;
   livemap::web::WebConfig options_;
+  std::optional<livemap::zone::ErasureDesk> erasures_;
   std::unique_ptr<livemap::web::WebServer> server_;
 };
 
@@ -280,7 +292,8 @@ int main(int argc, char** argv) {
       streets = std::make_shared<const livemap::streets::StreetMap>(
           livemap::streets::ReadStreetFile(argv[1]));
     }
-    Session session(std::move(streets), argc > 2 ? argv[2] : "", argc > 3 ? argv[3] : "");
+    const auto argument = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
+    Session session(std::move(streets), argument(2), argument(3), argument(4), argument(5));
     std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;

@@ -1,0 +1,176 @@
+#include "web/access/account_api.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "accounts/account_store.h"
+#include "common/clock.h"
+#include "test/web/http/http_client.h"
+#include "test/web/zone_fixture.h"
+#include "web/server/web_server.h"
+
+namespace livemap::web {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr char kSamePassword[] = "correct horse battery";
+
+/// Of somebody who has logged in.
+struct LoggedIn {
+  std::string cookie;
+  std::string csrf_token;
+
+  Headers ToRead() const { return {{"Cookie", cookie}}; }
+  Headers ToChange() const {
+    return {{"Cookie", cookie}, {"X-CSRF-Token", csrf_token}, {"Content-Type", "application/json"}};
+  }
+};
+
+class AccountApiTest : public testing::Test {
+ protected:
+  AccountApiTest() {
+    const std::string file = folder_.path() + "/accounts.sqlite";
+    accounts::AccountStore store(file, {});
+    store.Add("jones", accounts::Role::kViewer, kSamePassword, SystemNs());
+    store.Add("miller", accounts::Role::kOfficial, kSamePassword, SystemNs());
+    store.Add("root", accounts::Role::kAdmin, kSamePassword, SystemNs());
+    WebConfig options = TestOptions();
+    options.accounts_file = file;
+    options.token_file = tokens_.path();
+    server_ = std::make_unique<WebServer>(options, *fixture_.zone, fixture_.catalogue);
+  }
+
+  int port() const { return server_->port(); }
+  HttpResult TryLogIn(const std::string& name, const std::string& password = kSamePassword) {
+    return Request(port(), "POST", "/api/v1/session", {{"Content-Type", "application/json"}},
+                   nlohmann::json{{"name", name}, {"password", password}}.dump());
+  }
+  LoggedIn LogIn(const std::string& name) {
+    const HttpResult answer = TryLogIn(name);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    const std::string cookie = answer.Field("Set-Cookie");
+    return {cookie.substr(0, cookie.find(';')), answer.Json().value("csrf_token", "")};
+  }
+  HttpResult Do(const std::string& what, const std::string& name, const Headers& headers) {
+    return Request(port(), "POST", "/api/v1/accounts/" + what, headers,
+                   nlohmann::json{{"name", name}}.dump());
+  }
+  bool IsLoggedIn(const LoggedIn& somebody) {
+    return !Get(port(), "/api/v1/session", somebody.ToRead()).Json()["name"].is_null();
+  }
+
+  TokenFile tokens_;
+  TemporaryFolder folder_;
+  ZoneFixture fixture_;
+  std::unique_ptr<WebServer> server_;
+};
+
+TEST_F(AccountApiTest, OnlyAnAdminWhoHasLoggedInSeesAndChangesAccounts) {
+  const LoggedIn official = LogIn("miller");
+  const Headers token{{"Authorization", "Bearer " + TokenFile::token()},
+                      {"Content-Type", "application/json"}};
+  for (const char* address : {"/api/v1/accounts", "/api/v1/accounts/events"}) {
+    EXPECT_EQ(Get(port(), address).status, 401);
+    EXPECT_EQ(Get(port(), address, token).status, 401) << "a program's token is no admin";
+    EXPECT_EQ(Get(port(), address, official.ToRead()).status, 403);
+    EXPECT_EQ(Get(port(), address, LogIn("root").ToRead()).status, 200);
+  }
+  EXPECT_EQ(Do("lock", "jones", official.ToChange()).status, 403);
+  EXPECT_EQ(Do("lock", "jones", token).status, 401);
+  LoggedIn forged = LogIn("root");
+  forged.csrf_token[0] = forged.csrf_token[0] == '0' ? '1' : '0';
+  EXPECT_EQ(Do("lock", "jones", forged.ToChange()).status, 403);
+  EXPECT_EQ(TryLogIn("jones").status, 200) << "nothing was locked";
+}
+
+TEST_F(AccountApiTest, ListsWhoHasAnAccountAndHowManySessions) {
+  LogIn("miller");
+  LogIn("miller");
+  const HttpResult answer = Get(port(), "/api/v1/accounts", LogIn("root").ToRead());
+  const auto accounts = answer.Json()["accounts"];
+  ASSERT_EQ(accounts.size(), 3U);
+  EXPECT_EQ(accounts[0]["name"], "jones");
+  EXPECT_EQ(accounts[0]["sessions"], 0);
+  EXPECT_TRUE(accounts[0]["last_log_in"].is_null());
+  EXPECT_EQ(accounts[1]["role"], "official");
+  EXPECT_EQ(accounts[1]["sessions"], 2);
+  EXPECT_FALSE(accounts[1]["last_log_in"].is_null());
+  EXPECT_EQ(accounts[1]["locked"], false);
+  EXPECT_THAT(answer.body, Not(HasSubstr("argon2")));
+}
+
+TEST_F(AccountApiTest, ALockEndsSessionsAndKeepsTheAccountOutUntilItIsUnlocked) {
+  const LoggedIn admin = LogIn("root");
+  const LoggedIn official = LogIn("miller");
+  const HttpResult answer = Do("lock", "miller", admin.ToChange());
+  EXPECT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(answer.Json()["locked"], true);
+  EXPECT_FALSE(IsLoggedIn(official));
+  EXPECT_EQ(TryLogIn("miller").status, 401);
+  EXPECT_EQ(Do("unlock", "miller", admin.ToChange()).status, 200);
+  EXPECT_FALSE(IsLoggedIn(official)) << "the session of before stays ended";
+  EXPECT_EQ(TryLogIn("miller").status, 200);
+}
+
+TEST_F(AccountApiTest, EndsSessionsWithoutALock) {
+  const LoggedIn admin = LogIn("root");
+  const LoggedIn first = LogIn("miller");
+  const LoggedIn second = LogIn("miller");
+  EXPECT_EQ(Do("end_sessions", "miller", admin.ToChange()).Json()["ended"], 2);
+  EXPECT_FALSE(IsLoggedIn(first));
+  EXPECT_FALSE(IsLoggedIn(second));
+  EXPECT_TRUE(IsLoggedIn(admin));
+  EXPECT_EQ(TryLogIn("miller").status, 200);
+}
+
+TEST_F(AccountApiTest, TheTrailSaysWhoLoggedInWhoFailedAndWhatAdminsDid) {
+  TryLogIn("miller", "a wrong password");
+  TryLogIn("my secret passphrase", "miller");
+  const LoggedIn admin = LogIn("root");
+  Do("lock", "miller", admin.ToChange());
+  Request(port(), "DELETE", "/api/v1/session", admin.ToChange());
+  const HttpResult answer = Get(port(), "/api/v1/accounts/events", LogIn("root").ToRead());
+  const auto events = answer.Json()["events"];
+  ASSERT_EQ(events.size(), 6U) << answer.body;
+  const auto told = [&](std::size_t i) {
+    return events[i]["event"].get<std::string>() + " " + events[i]["name"].get<std::string>() +
+           " by " + events[i]["by"].get<std::string>();
+  };
+  EXPECT_EQ(told(0), "log_in root by root");
+  EXPECT_EQ(told(1), "log_out root by root");
+  EXPECT_EQ(told(2), "lock miller by root");
+  EXPECT_EQ(told(3), "log_in root by root");
+  EXPECT_EQ(told(4), "wrong_password  by ");
+  EXPECT_EQ(told(5), "wrong_password miller by miller");
+  EXPECT_EQ(events[5]["client"], "127.0.0.1");
+  EXPECT_THAT(answer.body, Not(HasSubstr("secret passphrase"))) << "a password in the wrong field";
+  EXPECT_TRUE(answer.Json()["next"].is_null());
+  const auto page = Get(port(), "/api/v1/accounts/events?limit=2&before=4", LogIn("root").ToRead());
+  ASSERT_EQ(page.Json()["events"].size(), 2U) << page.body;
+  EXPECT_EQ(page.Json()["events"][0]["id"], 3);
+  EXPECT_EQ(page.Json()["next"], 2);
+}
+
+TEST_F(AccountApiTest, RefusesWhatItDoesNotKnow) {
+  const LoggedIn admin = LogIn("root");
+  EXPECT_EQ(Do("lock", "nobody", admin.ToChange()).status, 404);
+  EXPECT_EQ(Do("lock", "root", admin.ToChange()).status, 409) << "the own account";
+  EXPECT_EQ(Do("explode", "jones", admin.ToChange()).status, 404);
+  EXPECT_EQ(Get(port(), "/api/v1/accounts/lock", admin.ToRead()).status, 405);
+  EXPECT_EQ(Do("", "jones", admin.ToChange()).status, 404);
+  EXPECT_EQ(Request(port(), "POST", "/api/v1/accounts", admin.ToChange(), "{}").status, 405);
+  for (const char* body : {"", "[]", "{}", R"({"name": 1})", R"({"name": "a", "b": 1})"}) {
+    EXPECT_EQ(Request(port(), "POST", "/api/v1/accounts/lock", admin.ToChange(), body).status, 400)
+        << body;
+  }
+  EXPECT_EQ(Get(port(), "/api/v1/accounts?limit=1", admin.ToRead()).status, 400);
+  EXPECT_EQ(Get(port(), "/api/v1/accounts/events?hazard=1", admin.ToRead()).status, 400);
+}
+
+}  // namespace
+}  // namespace livemap::web
