@@ -7,7 +7,7 @@
 namespace livemap::zone {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kAllowanceSecondNs = 1'000'000'000;
 
 OffloadAllowance::Config Small() {
   OffloadAllowance::Config config;
@@ -21,16 +21,16 @@ TEST(OffloadAllowance, FramesRefillEvenlyOverAMinute) {
   OffloadAllowance allowance(Small());
   for (int i = 0; i < 6; ++i) EXPECT_TRUE(allowance.Take("car-1", 1, 0));
   EXPECT_FALSE(allowance.Take("car-1", 1, 0));
-  EXPECT_FALSE(allowance.Take("car-1", 1, 9 * kSecondNs));
-  EXPECT_TRUE(allowance.Take("car-1", 1, 11 * kSecondNs));
+  EXPECT_FALSE(allowance.Take("car-1", 1, 9 * kAllowanceSecondNs));
+  EXPECT_TRUE(allowance.Take("car-1", 1, 11 * kAllowanceSecondNs));
 }
 
 TEST(OffloadAllowance, BytesAreLimitedToo) {
   OffloadAllowance allowance(Small());
   EXPECT_FALSE(allowance.Take("car-1", 601, 0));
   EXPECT_TRUE(allowance.Take("car-1", 600, 0)) << "a refused frame takes nothing";
-  EXPECT_FALSE(allowance.Take("car-1", 100, 5 * kSecondNs));
-  EXPECT_TRUE(allowance.Take("car-1", 100, 11 * kSecondNs));
+  EXPECT_FALSE(allowance.Take("car-1", 100, 5 * kAllowanceSecondNs));
+  EXPECT_TRUE(allowance.Take("car-1", 100, 11 * kAllowanceSecondNs));
 }
 
 TEST(OffloadAllowance, OneVehicleTakesNothingFromAnother) {
@@ -42,15 +42,15 @@ TEST(OffloadAllowance, OneVehicleTakesNothingFromAnother) {
 TEST(OffloadAllowance, ManyIdsDoNotGrowItAndSilentOnesMakeRoom) {
   OffloadAllowance allowance(Small());
   EXPECT_TRUE(allowance.Take("car-1", 1, 0));
-  EXPECT_TRUE(allowance.Take("car-2", 1, 30 * kSecondNs));
-  EXPECT_FALSE(allowance.Take("car-3", 1, 31 * kSecondNs));
-  EXPECT_TRUE(allowance.Take("car-3", 1, 61 * kSecondNs));
+  EXPECT_TRUE(allowance.Take("car-2", 1, 30 * kAllowanceSecondNs));
+  EXPECT_FALSE(allowance.Take("car-3", 1, 31 * kAllowanceSecondNs));
+  EXPECT_TRUE(allowance.Take("car-3", 1, 61 * kAllowanceSecondNs));
   EXPECT_EQ(allowance.vehicles(), 2U);
 }
 
 TEST(OffloadAllowance, AClockThatIsSetBackTakesNothingAway) {
   OffloadAllowance allowance(Small());
-  EXPECT_TRUE(allowance.Take("car-1", 1, 100 * kSecondNs));
+  EXPECT_TRUE(allowance.Take("car-1", 1, 100 * kAllowanceSecondNs));
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(allowance.Take("car-1", 1, 0));
   EXPECT_FALSE(allowance.Take("car-1", 1, 0));
 }

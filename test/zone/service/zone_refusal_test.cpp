@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kRefusedSecondNs = 1'000'000'000;
 
 class ZoneRefusalTest : public ZoneTest {
  protected:
@@ -63,10 +63,10 @@ TEST_F(ZoneRefusalTest, AnotherVehiclesReportSentAgainIsAReplay) {
 
 TEST_F(ZoneRefusalTest, AReportFromAnOutboxMayBeOldButNotOlderThanTheLimit) {
   protocol::Report waited = MakeReport();
-  waited.stamp_ns = kNowNs - 29 * 86400 * kSecondNs;
+  waited.stamp_ns = kNowNs - 29 * 86400 * kRefusedSecondNs;
   EXPECT_EQ(Reason(waited), "");
   protocol::Report stale = MakeReport({50, 8});
-  stale.stamp_ns = kNowNs - 31 * 86400 * kSecondNs;
+  stale.stamp_ns = kNowNs - 31 * 86400 * kRefusedSecondNs;
   EXPECT_THAT(Reason(stale), HasSubstr("past"));
   EXPECT_EQ(Refused(RefusalKind::kTooOld), 1U);
 }
@@ -76,7 +76,7 @@ TEST_F(ZoneRefusalTest, AReplayedDriveCountsAsOfItsArrivalHoweverOldItIs) {
   config.replay = true;
   ZoneService zone(config, Clock(), 1);
   protocol::Report report = MakeReport();
-  report.stamp_ns = kNowNs - 3 * 365 * 86400 * kSecondNs;
+  report.stamp_ns = kNowNs - 3 * 365 * 86400 * kRefusedSecondNs;
   const protocol::Receipt receipt = zone.Handle(report);
   EXPECT_EQ(receipt.reason, "");
   zone.Advance();
@@ -88,7 +88,7 @@ TEST_F(ZoneRefusalTest, AReplayedDriveCountsAsOfItsArrivalHoweverOldItIs) {
 
 TEST_F(ZoneRefusalTest, AStampOfTheFutureIsRefusedAndCounted) {
   protocol::Report report = MakeReport();
-  report.stamp_ns = kNowNs + 400 * kSecondNs;
+  report.stamp_ns = kNowNs + 400 * kRefusedSecondNs;
   EXPECT_THAT(Reason(report), HasSubstr("future"));
   EXPECT_EQ(Refused(RefusalKind::kFuture), 1U);
 }
@@ -132,7 +132,7 @@ TEST_F(ZoneRefusalTest, OtherVehiclesHaveTheirOwnPlaces) {
 
 TEST_F(ZoneRefusalTest, OneWrongFixDoesNotShutAnHonestVehicleOut) {
   EXPECT_EQ(Reason(Sample(0, 0)), "");
-  now_ns_ += 7200 * kSecondNs;
+  now_ns_ += 7200 * kRefusedSecondNs;
   // After a long pause a wild fix looks possible and is taken; then the vehicle is where it was.
   EXPECT_EQ(Reason(Sample(3600, 300000)), "");
   int refused = 0;
@@ -167,7 +167,7 @@ TEST_F(ZoneRefusalTest, ReportsBeyondTheHourlyCapGetNoReceiptAndAreTakenLater) {
   other.vehicle_id = "car-2";
   EXPECT_EQ(zone.Handle(other).status, protocol::Receipt::Status::kCommitted);
   EXPECT_THROW(zone.Handle(reports[7]), Error);
-  now_ns += 3600 * kSecondNs;
+  now_ns += 3600 * kRefusedSecondNs;
   for (std::size_t i = 5; i < 8; ++i) {
     EXPECT_EQ(zone.Handle(reports[i]).status, protocol::Receipt::Status::kCommitted);
   }
