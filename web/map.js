@@ -13,6 +13,7 @@ import { AreaFilter } from './desk/area_filter.js';
 import { AssignmentList } from './desk/assignment_list.js';
 import { csvOf, geoJsonOf, saveFile } from './desk/export.js';
 import { StatisticsView } from './desk/statistics_view.js';
+import { FrameRequests } from './desk/frame_request.js';
 import { HazardHistory } from './desk/time_line.js';
 import { WorkDialog } from './desk/work_dialog.js';
 import { HazardLayer } from './layers/hazard_layer.js';
@@ -76,12 +77,16 @@ class Page {
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue, config.streets,
-        [this.history.section(hazard),
+        [...this.frames.section(hazard), this.history.section(hazard),
           ...this.officials.buttons(hazard, this.work.button(hazard))]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
     this.history = new HazardHistory((id) => this.layer.redraw(id),
       (hazard, id) => this.officials.askUndo(hazard, id));
+    this.frames = new FrameRequests((text, hazard, id) => {
+      this.officials.sayDoneAtDesk(text, hazard, id);
+      this.history.renew(hazard);
+    });
     this.work = new WorkDialog(map, this.catalogue, {
       onDone: (text, hazard, id) => {
         this.officials.sayDoneAtDesk(text, hazard, id);

@@ -1,23 +1,20 @@
 // A hazard's history as a time line: what happened to it, what officials did, and for those who have
 // logged in every sighting with its picture. Fetched when somebody opens it in the popup.
 
-import { addressOf } from '../address.js';
 import { element } from '../dom.js';
-import { localTime, percent, utcTime } from '../format.js';
+import { localTime, utcTime } from '../format.js';
 import { stateLabel } from '../hazard_state.js';
 import { session } from '../session.js';
+import { answerWords, sightingWords } from '../viewer/hazard_pictures.js';
+import { pictureAddress } from '../viewer/picture_address.js';
+import { opensViewer } from '../viewer/picture_viewer.js';
 import { getJson } from '../zone_lists.js';
 
 const MOST_EVENTS = 50;
 const MOST_DECISIONS = 50;
 /** Their words stand in the events already. */
 const IN_EVENTS = ['confirm', 'reject', 'close', 'class', 'move', 'undo'];
-const DONE = { comment: 'Comment', assign: 'Assigned', merge: 'Merged' };
-
-/** Only the server's own pictures. */
-function pictureAddress(url) {
-  return typeof url === 'string' && /^\/images\/[0-9a-f]{64}$/.test(url) ? addressOf(url) : null;
-}
+const DONE = { comment: 'Comment', assign: 'Assigned', merge: 'Merged', frame: 'Whole frame asked for' };
 
 /** What happened, as {time, nodes}, each source by itself; null where it cannot be had. */
 async function load(hazard) {
@@ -28,7 +25,8 @@ async function load(hazard) {
       getJson(`/api/v1/hazards/${hazard.id}/sightings`));
   }
   const [events, decisions = { decisions: [] }, sightings = { sightings: [] }] = await Promise.all(wanted);
-  return { events: events.events, decisions: decisions.decisions, sightings: sightings.sightings };
+  return { events: events.events, decisions: decisions.decisions, sightings: sightings.sightings,
+    answers: sightings.answers ?? [] };
 }
 
 export class HazardHistory {
@@ -83,8 +81,10 @@ export class HazardHistory {
   content(hazard) {
     if (this.failed) return element('p', { class: 'history-note' }, 'The history cannot be loaded');
     if (this.told === null) return element('p', { class: 'history-note' }, 'Loading');
-    const { events, decisions, sightings } = this.told;
-    const lines = [...events.map(eventLine), ...sightings.map(sightingLine),
+    const { events, decisions, sightings, answers } = this.told;
+    const lines = [...events.map(eventLine),
+      ...sightings.map((one) => pictureLine(hazard, one, 'Seen', sightingWords(one))),
+      ...answers.map((one) => pictureLine(hazard, one, 'Asked', answerWords(one))),
       ...decisions.filter(({ decision }) => !IN_EVENTS.includes(decision))
         .map((decision) => this.decisionLine(hazard, decision))];
     // Stable: what happened at one time stays in the order of its source, the newest first.
@@ -125,13 +125,14 @@ function eventLine(event) {
     element('span', { class: 'history-reason' }, event.reason)) };
 }
 
-function sightingLine({ time, confidence, image, why_no_image: why, merged }) {
+/** A line with a picture, which opens in the viewer. */
+function pictureLine(hazard, { time, image, why_no_image: why }, step, words) {
   const url = pictureAddress(image);
-  const words = `${percent(confidence)} sure${merged ? ', of the one that was merged' : ''}`;
   const picture = url === null ? element('span', { class: 'history-no-picture' }, why ?? 'no picture')
-    : element('a', { class: 'history-picture', href: url, target: '_blank', rel: 'noopener' },
-      element('img', { src: url, loading: 'lazy', width: 96, height: 64, alt: `Picture of ${time}` }));
+    : opensViewer(element('a', { class: 'history-picture', href: url, target: '_blank', rel: 'noopener' },
+      element('img', { src: url, loading: 'lazy', width: 96, height: 64,
+        alt: `Picture of ${localTime(Date.parse(time))}` })), hazard, url);
   return { time: Date.parse(time), item: element('li', { class: 'history-sighting' }, timeOf(time),
-    element('span', { class: 'history-step' }, 'Seen'),
+    element('span', { class: 'history-step' }, step),
     element('span', { class: 'history-reason' }, words), picture) };
 }

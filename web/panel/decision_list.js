@@ -12,7 +12,7 @@ const DONE = {
   confirm: 'Confirmed', reject: 'Rejected', dismiss: 'Dismissed', distrust: 'Distrusted',
   trust: 'Trusted again', undo: 'Took back a decision about', comment: 'Commented on',
   assign: 'Assigned', close: 'Closed as repaired', class: 'Changed the class of', move: 'Moved',
-  merge: 'Merged', forget: 'Forgot',
+  merge: 'Merged', frame: 'Asked for a whole frame of', forget: 'Forgot',
 };
 const SUBJECTS = { hazard: 'a hazard', map_change: 'a map change' };
 

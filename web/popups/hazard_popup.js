@@ -1,57 +1,19 @@
 // What a click on a hazard shows.
 
-import { addressOf } from '../address.js';
 import { element } from '../dom.js';
 import { localTime, percent, plural, position, streetText, utcTime } from '../format.js';
 import { REJECTED, stateLabel, stateMeaning } from '../hazard_state.js';
+import { awaitPicture, pictureAddress } from '../viewer/picture_address.js';
+import { opensViewer } from '../viewer/picture_viewer.js';
 
 /** A hazard remembers so many vehicles. */
 const MOST_VEHICLES = 6;
-
-/** Only the server's own pictures: a path of /images with a content hash. */
-function safeImage(url) {
-  return typeof url === 'string' && /^\/images\/[0-9a-f]{64}$/.test(url) ? addressOf(url) : null;
-}
-
-/** The zone makes one picture after the other, and sends away whom it keeps waiting. */
-const RETRY_MS = 2000;
-const COMING = 'The zone is busy: the picture comes in a moment';
-const GONE = 'The picture is no longer kept';
-
-/** What the zone says of a picture: an HTTP status, 0 for no answer. */
-async function statusOf(url) {
-  try {
-    return (await fetch(url, { method: 'HEAD', credentials: 'same-origin' })).status;
-  } catch (failure) {
-    return 0;
-  }
-}
-
-/** Asks for a picture that did not come until the zone has it, has it no more, or nobody looks at
- * `note` any longer. `wasThere`: the zone had it before, and it could not be shown. */
-async function awaitPicture(note, hazard, url, wasThere) {
-  for (;;) {
-    const status = await statusOf(url);
-    if (!note.isConnected) return;
-    if (status === 404 || (status === 200 && wasThere)) {
-      note.textContent = status === 404 ? GONE : 'The picture cannot be shown';
-      return;
-    }
-    if (status === 200) {
-      note.replaceWith(pictureOf(hazard, true));
-      return;
-    }
-    note.textContent = COMING;
-    await new Promise((resolve) => { setTimeout(resolve, RETRY_MS); });
-    if (!note.isConnected) return;
-  }
-}
 
 /** The hazard's picture, or why there is none. */
 export function pictureOf(hazard, wasThere = false) {
   // Not known yet: the place is kept, so that the popup does not jump.
   if (hazard.image === undefined) return element('div', { class: 'picture picture-coming' });
-  const url = safeImage(hazard.image);
+  const url = pictureAddress(hazard.image);
   if (!url) return element('p', { class: 'no-picture' }, 'No picture came with this report');
   const image = element('img', {
     class: 'picture', src: url, width: 300, height: 200,
@@ -60,12 +22,15 @@ export function pictureOf(hazard, wasThere = false) {
   image.onerror = ({ currentTarget }) => {
     const note = element('p', { class: 'no-picture' }, '\u2026');
     currentTarget.closest('.picture-link').replaceWith(note);
-    awaitPicture(note, hazard, url, wasThere);
+    const say = (text) => { note.textContent = text; };
+    awaitPicture(url, wasThere, () => note.isConnected, say).then((came) => {
+      if (came) note.replaceWith(pictureOf(hazard, true));
+    });
   };
-  return element('a', {
-    class: 'picture-link', href: url, target: '_blank', rel: 'noopener',
-    title: 'Open the picture in full size',
-  }, image);
+  return opensViewer(element('a', {
+    class: 'picture-link', href: url, target: '_blank', rel: 'noopener', 'data-focus': 'picture',
+    title: 'Look closer, and at all pictures',
+  }, image), hazard, url);
 }
 
 export function time(value) {

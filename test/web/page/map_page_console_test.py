@@ -169,6 +169,128 @@ class Console(OfficialsPage):
         self.wait(lambda: self.count("#hazard-list button") == 2, "they are not split")
         self.assert_quiet()
 
+    def ask_for_frame(self, hazard):
+        self.open_popup_of(hazard)
+        self.click('.popup [data-focus="frame"]')
+        self.wait_for_text(".frame-state", "Whole frame asked for", "by miller, waiting for a vehicle until")
+
+    def pass_by(self, answer, picture=True):
+        """A vehicle comes to the hazard at LAT, LON from the south, and answers what it is asked."""
+        for metres in (60, 50, 40):
+            self.zone.do("vehicle", id="car-7", lat=LAT - metres / 111132, lon=LON, course=0.0, speed=8.0)
+        asked = self.zone.do("answer_polls", answer=answer, picture=picture)
+        self.assertEqual(asked["answered"], asked["frames"], "another poll than that for the frame")
+        return asked["frames"]
+
+    def test_the_next_vehicle_is_asked_for_the_whole_frame_which_stands_in_the_history(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open_as("miller")
+        self.ask_for_frame(hazard)
+        self.assertEqual(self.count('.popup [data-focus="frame"]'), 0, "one request at a time")
+        self.look("frame_waiting")
+        self.assertEqual(self.pass_by("no"), 1)
+        self.wait_for_text(".frame-state", "here it is")
+        self.assertEqual(self.count('.popup [data-focus="frame"]'), 1, "another one may be asked for")
+        self.open_history()
+        self.wait_for_text(".history-list", "Whole frame asked for",
+                           "Whole frame, asked for by an official: it was not found")
+        self.wait(lambda: self.browser.execute_script(
+            "return [...document.querySelectorAll('.history-picture img')].filter((one) => one.naturalWidth > 0)"
+            ".length") == 2, "not both pictures are in the time line")
+        self.look("frame_taken")
+        self.click(".frame-state a")
+        self.wait_for_text("#viewer-words", "1 of 2", "Whole frame")
+        self.press(Keys.ESCAPE)
+        self.wait(lambda: not self.find("#viewer").is_displayed(), "the viewer stays")
+        self.click("#trail-section summary")
+        self.wait_for_text("#trail", "Asked for a whole frame of a hazard", "miller")
+        self.assert_quiet()
+
+    def test_a_request_for_a_frame_is_taken_back_or_runs_out(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.open_as("miller")
+        self.ask_for_frame(hazard)
+        self.click("#notice-undo")
+        self.wait_for_text(".frame-state", "taken back")
+        self.assertEqual(self.pass_by("yes"), 0, "nobody is asked any more")
+        self.ask_for_frame(hazard)
+        self.zone.do("pass", seconds=4 * 3600 + 60)
+        self.wait_for_text(".frame-state", "no vehicle brought one in time")
+        self.assert_quiet()
+
+    def test_pictures_are_looked_at_closer_and_one_after_the_other(self):
+        hazard = self.zone.report("pothole", LAT, LON)
+        self.zone.report("pothole", LAT, LON, vehicle="car-2", label="second look")
+        self.zone.report("pothole", LAT, LON, vehicle="car-3", label="third look")
+        self.open_as("miller")
+        self.open_popup_of(hazard)
+        self.click(".popup .picture-link")
+        self.wait_for_text("#viewer-words", " of 3", "% sure")
+        self.wait(lambda: self.zoom_of_picture() == 1, "the picture does not come")
+        self.assertIn("Pothole", self.find("#viewer-image").get_attribute("alt"))
+        self.look("viewer")
+        first = self.find("#viewer-image").get_attribute("src")
+        # By keys.
+        self.press("+")
+        self.wait(lambda: self.zoom_of_picture() > 1.4, "+ does not enlarge")
+        before = self.picture_place()
+        self.press(Keys.ARROW_LEFT)
+        self.wait(lambda: self.picture_place()["left"] > before["left"], "the arrow does not move it")
+        self.assertEqual(self.find("#viewer-image").get_attribute("src"), first)
+        self.press("-", "-")
+        self.wait(lambda: self.zoom_of_picture() == 1, "- does not make it smaller")
+        # By the wheel: what is under the pointer stays there.
+        stage = self.find("#viewer-stage")
+        self.browser.execute_script("""
+            const {left, top, width, height} = arguments[0].getBoundingClientRect();
+            arguments[0].dispatchEvent(new WheelEvent('wheel', {deltaY: -400, cancelable: true,
+              clientX: left + width / 4, clientY: top + height / 2}));""", stage)
+        self.wait(lambda: self.zoom_of_picture() > 2, "the wheel does not enlarge")
+        self.picture("viewer_close")
+        # By two fingers.
+        self.press("0")
+        self.wait(lambda: self.zoom_of_picture() == 1, "0 does not show the whole picture")
+        self.pinch(stage, 100, 300)
+        self.wait(lambda: self.zoom_of_picture() > 2, "two fingers do not enlarge")
+        self.press("0", Keys.ARROW_RIGHT)
+        self.wait_for_text("#viewer-words", "2 of 3")
+        self.wait(lambda: self.find("#viewer-image").get_attribute("src") != first, "it is the same picture")
+        self.press(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+        self.wait_for_text("#viewer-words", "3 of 3")
+        self.assertFalse(self.find("#viewer-next").is_enabled(), "there is no fourth")
+        self.press(Keys.ESCAPE)
+        self.wait(lambda: not self.find("#viewer").is_displayed(), "Escape does not close it")
+        self.assertEqual(self.browser.execute_script("return document.activeElement.className"), "picture-link")
+        self.wait_for(".popup", 1)
+        self.assert_quiet()
+
+    def picture_place(self):
+        return self.browser.execute_script(
+            "return document.getElementById('viewer-image').getBoundingClientRect().toJSON()")
+
+    def zoom_of_picture(self):
+        """How much larger than fitted; 0 before the picture has come."""
+        return self.browser.execute_script("""
+            const image = document.getElementById('viewer-image');
+            const width = parseFloat(image.style.width);
+            return image.naturalWidth > 0 && width > 0
+              ? Math.round(1000 * image.getBoundingClientRect().width / width) / 1000 : 0;""")
+
+    def pinch(self, element, from_px, to_px):
+        """Two fingers around the middle, from so far apart to so far apart."""
+        self.browser.execute_script("""
+            const [stage, from, to] = arguments;
+            const {left, top, width, height} = stage.getBoundingClientRect();
+            const tell = (kind, id, x) => stage.dispatchEvent(new PointerEvent(kind, {
+              pointerId: id, pointerType: 'touch', bubbles: true, cancelable: true,
+              clientX: left + width / 2 + x, clientY: top + height / 2}));
+            for (const [id, side] of [[71, -1], [72, 1]]) tell('pointerdown', id, side * from / 2);
+            for (let step = 1; step <= 5; step += 1) {
+              const apart = from + (to - from) * step / 5;
+              for (const [id, side] of [[71, -1], [72, 1]]) tell('pointermove', id, side * apart / 2);
+            }
+            for (const id of [71, 72]) tell('pointerup', id, 0);""", element, from_px, to_px)
+
     def test_what_the_filters_leave_is_exported(self):
         self.zone.report("pothole", LAT, LON)
         self.zone.report("deer", LAT + 0.002, LON)

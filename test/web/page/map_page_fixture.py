@@ -51,9 +51,10 @@ class ZoneProcess:
         self.process.stdin.flush()
         return self.read()
 
-    def report(self, class_name, lat, lon, picture=True, vehicle="car-1"):
+    def report(self, class_name, lat, lon, picture=True, vehicle="car-1", label=None):
+        """`label`: what is written in the picture, by which it is another one; none: the class."""
         answer = self.do("report", **{"class": class_name}, lat=lat, lon=lon, picture=picture,
-                         vehicle=vehicle)
+                         vehicle=vehicle, **({} if label is None else {"label": label}))
         assert answer["status"] == "committed", answer
         return answer["id"]
 

@@ -3,7 +3,7 @@
 // stays, and the files of a certificate and its key; empty ones count as none. It takes one JSON
 // command per line on standard input and answers each with one line of JSON:
 //
-//   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V}
+//   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V, "label": L}
 //                                                                       -> {"id", "status",
 //                                                                       "reason"}
 //   {"do": "change", "class": C, "lat": D, "lon": D, "vanished": false, "vehicle": V} -> {"id"}
@@ -19,6 +19,8 @@
 //   {"do": "row", "class": C, "count": N, "lat": D, "lon": D}           hazards 20 m apart, going
 //                                           north, that drivers are told of -> {"hazards"}
 //   {"do": "vehicle", "id": V, "lat": D, "lon": D, "course": RAD, "speed": MPS} -> {"accepted"}
+//   {"do": "answer_polls", "answer": "yes", "no" or "cant_see", "picture": true}   every vehicle
+//                                           that is asked answers   -> {"answered", "frames"}
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
 //   {"do": "connections"}                                               -> {"connections"}
 //   {"do": "certificate"}                   how many were taken since the server's start ->
@@ -113,6 +115,7 @@ class Session {
     if (verb == "fill") return Fill(command);
     if (verb == "row") return AddToldRow(command);
     if (verb == "vehicle") return MoveVehicle(command);
+    if (verb == "answer_polls") return AnswerPolls(command);
     if (verb == "start") return Start();
     if (verb == "certificate") return {{"loads", server_->certificate().value().loads}};
     if (verb == "connections") return {{"connections", server_->connections()}};
@@ -189,7 +192,7 @@ class Session {
     report.vehicle_id = command.value("vehicle", report.vehicle_id);
     if (command.value("picture", true)) {
       report.image_format = "jpeg";
-      report.image = DrawnPicture(report.class_name);
+      report.image = DrawnPicture(command.value("label", report.class_name));
     }
     const livemap::protocol::Receipt receipt = fixture_.zone->Handle(report);
     const bool committed = receipt.status == livemap::protocol::Receipt::Status::kCommitted;
@@ -271,6 +274,36 @@ class Session {
     vehicle.speed_mps = command.at("speed");
     vehicle.stamp_ns = fixture_.now_ns;
     return {{"accepted", fixture_.zone->UpdateVehicle(vehicle)}};
+  }
+
+  /// With a picture where one is wanted; `frames` counts those that were to show the whole frame.
+  Json AnswerPolls(const Json& command) {
+    using livemap::protocol::PollAnswer;
+    using livemap::protocol::PollPicture;
+    const std::map<std::string, PollAnswer::Answer> kinds{
+        {"yes", PollAnswer::Answer::kYes},
+        {"no", PollAnswer::Answer::kNo},
+        {"cant_see", PollAnswer::Answer::kCantSee}};
+    Tick();
+    int answered = 0, frames = 0;
+    for (const livemap::protocol::Poll& poll : fixture_.zone->TakeDuePolls()) {
+      PollAnswer answer;
+      answer.poll = poll.poll;
+      answer.hazard = poll.hazard;
+      answer.vehicle_id = poll.vehicle_id;
+      answer.drive_id = "drive-1";
+      answer.stamp_ns = fixture_.now_ns;
+      answer.answer = kinds.at(command.value("answer", "yes"));
+      answer.confidence = 0.9F;
+      answer.vehicle_position = fixture_.zone->Vehicles().at(0).position;
+      if (command.value("picture", true) && poll.picture != PollPicture::kNone) {
+        answer.image_format = "jpeg";
+        answer.image = DrawnPicture("whole frame");
+      }
+      frames += poll.picture == PollPicture::kFullFrame ? 1 : 0;
+      answered += fixture_.zone->HandleAnswer(answer) ? 1 : 0;
+    }
+    return {{"answered", answered}, {"frames", frames}};
   }
 
   livemap::web::TokenFile tokens_;
