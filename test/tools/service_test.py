@@ -46,6 +46,21 @@ class ServiceTest(unittest.TestCase):
         done = subprocess.run([checker, "verify", *map(str, self.units.glob("*.service"))], capture_output=True, text=True)
         self.assertEqual((done.returncode, "livemap" in done.stderr), (0, False), done.stderr)
 
+    def test_the_brokers_unit_names_its_identity_and_nothing_of_ros(self):
+        done = self.install("broker", "--identity", "/var/lib/livemap/identity")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f'ExecStart="{ROOT}/livemap" "broker" "--identity" "/var/lib/livemap/identity"\n', self.unit("broker"))
+        self.assertNotIn("ROS_MASTER_URI", self.unit("broker"))
+        checker = shutil.which("systemd-analyze")
+        if checker:
+            done = subprocess.run([checker, "verify", str(self.units / "livemap-broker.service")], capture_output=True, text=True)
+            self.assertEqual((done.returncode, "livemap" in done.stderr), (0, False), done.stderr)
+
+    def test_a_broker_without_a_whole_path_of_its_identity_is_refused(self):
+        self.assert_refused(self.install("broker"), "--identity", "whole path")
+        self.assert_refused(self.install("broker", "--identity", "identity"), "'identity'", "whole path")
+        self.assert_refused(self.install("broker", "--identity", "/i", "zone:=town"), "zone:=town")
+
     def test_values_reach_the_vehicle_as_they_are(self):
         done = self.install("vehicle", 'hazard_reporting:={max_range_m: 15}', 'path:=/data/50% "off" $HOME\\x')
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -57,6 +72,7 @@ class ServiceTest(unittest.TestCase):
         self.assert_refused(self.install("zone", "directory:=~/zone"), "~/zone", "whole path")
         self.assert_refused(self.install("vehicle", "camera_info_url:=file://~/camera.yaml"), "camera.yaml", "whole path")
         self.assert_refused(self.install("vehicle", "identity:=car-1"), "car-1", "whole path")
+        self.assert_refused(self.install("zone", "work_orders:=orders.yaml"), "orders.yaml", "whole path")
         self.assert_refused(self.install("vehicle", "--master-port", "80"), "80", "1024")
         self.assert_refused(self.install("vehicle", "vehicle:=car\n[Service]\nUser=root"), "control character")
         self.assert_refused(self.install("vehicle", "--user", "nobody-of-this-name"), "nobody-of-this-name")
