@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """What a real zone's server answers as feeds is what the standards say: by their own schemas where those are there,
-and by structure always. Every place lies in the town: a latitude near 40 and a longitude near -80, which no swap of
+else by our own profiles of them (profiles/README.md), and by structure always. Every place lies in the town: a latitude near 40 and a longitude near -80, which no swap of
 axes leaves as they are.
 
   feed_schema_test.py --server PATH_OF_map_page_server
@@ -39,12 +39,16 @@ ATOM, GEORSS = "{http://www.w3.org/2005/Atom}", "{http://www.georss.org/georss}"
 GPX = "{http://www.topografix.com/GPX/1/1}"
 COM, LOC = "{http://datex2.eu/schema/3/common}", "{http://datex2.eu/schema/3/locationReferencing}"
 SIT, XSI = "{http://datex2.eu/schema/3/situation}", "{http://www.w3.org/2001/XMLSchema-instance}"
-# The order that the sequences of DATEX II's SituationRecord and of its kinds have, as far as they are used.
-RECORD_ORDER = ["situationRecordCreationTime", "situationRecordObservationTime", "situationRecordVersionTime",
-                "probabilityOfOccurrence", "safetyRelatedMessage", "validity", "generalPublicComment",
-                "locationReference", "animalPresenceType", "roadworksDurationClassification", "roadMaintenanceType",
-                "obstructionType"]
+PROFILES = pathlib.Path(__file__).with_name("profiles")
 CHECKS = jsonschema.FormatChecker() if jsonschema else None
+
+
+def json_profile(name):
+    return jsonschema.Draft7Validator(json.loads((PROFILES / name).read_text()), format_checker=CHECKS)
+
+
+def datex_profile():
+    return etree.XMLSchema(etree.parse(str(PROFILES / "datex_payload.xsd")))
 
 
 def json_schema(url):
@@ -197,12 +201,12 @@ class Feeds(unittest.TestCase):
             self.assertEqual((code, refusal["code"]), (400, "InvalidParameterValue"), bad)
 
     def test_cifs(self):
-        incidents = [each["incident"] for each in self.get_json("feeds/cifs.json")["incidents"]]
-        self.assertEqual(len(incidents), 9)
+        feed = self.get_json("feeds/cifs.json")
+        json_profile("cifs.json").validate(feed)
+        incidents = [each["incident"] for each in feed["incidents"]]
+        self.assertEqual(len({incident["id"] for incident in incidents}), 9)
         for incident in incidents:
-            for key in ("id", "type", "polyline", "street", "starttime", "description", "direction"):
-                self.assertTrue(incident[key], key)
-            self.assertIn(incident["type"], ("HAZARD", "ACCIDENT"))
+            self.assertLess(incident["starttime"], incident["endtime"])
             numbers = incident["polyline"].split()
             self.assertEqual(len(numbers), 4 if incident["direction"] == "ONE_DIRECTION" else 2)
             for lat, lon in zip(numbers[::2], numbers[1::2]):
@@ -211,16 +215,10 @@ class Feeds(unittest.TestCase):
 
     def test_datex(self):
         root = etree.fromstring(self.get("feeds/srti.xml"))
-        self.assertEqual(root.tag, "{http://datex2.eu/schema/3/d2Payload}payload")
+        datex_profile().assertValid(root)
         self.assertEqual(root.get(XSI + "type"), "sit:SituationPublication")
-        self.assertEqual([child.tag for child in root][:2], [COM + "publicationTime", COM + "publicationCreator"])
         kinds = {}
-        for situation in root.iter(SIT + "situation"):
-            self.assertEqual([child.tag[len(SIT):] for child in situation],
-                             ["situationVersionTime", "headerInformation", "situationRecord"])
-            record = situation[2]
-            order = [RECORD_ORDER.index(child.tag[len(SIT):]) for child in record]
-            self.assertEqual(order, sorted(order))
+        for record in root.iter(SIT + "situationRecord"):
             self.assert_in_town(record.find(f".//{LOC}longitude").text, record.find(f".//{LOC}latitude").text)
             start, end = (record.find(f".//{COM}overall{side}Time").text for side in ("Start", "End"))
             self.assertLess(start, end)
@@ -233,19 +231,56 @@ class Feeds(unittest.TestCase):
         lines = [json.loads(line) for line in self.get("feeds/denm.ndjson").splitlines()]
         self.assertEqual(len(lines), 9)
         self.assertEqual(len({json.dumps(line["message"]["denm"]["management"]["actionID"]) for line in lines}), 9)
-        ranges = {"validityDuration": (1, 86400), "detectionTime": (0, 2**42 - 1), "referenceTime": (0, 2**42 - 1)}
+        profile = json_profile("denm.json")
         for line in lines:
-            management, situation = line["message"]["denm"]["management"], line["message"]["denm"]["situation"]
-            for key, (least, most) in ranges.items():
-                self.assertTrue(least <= management[key] <= most, key)
+            self.assertEqual(set(line), {"id", "message"})
+            profile.validate(line["message"])
+            management = line["message"]["denm"]["management"]
             position = management["eventPosition"]
             self.assert_in_town(position["longitude"] / 1e7, position["latitude"] / 1e7)
-            self.assertTrue(1 <= situation["informationQuality"] <= 7)
-            self.assertIn(situation["eventType"]["causeCode"], (2, 3, 9, 10, 11))
+            self.assertGreaterEqual(management["referenceTime"], management["detectionTime"])
         self.zone.do("reject", id=self.ids["pothole"])
-        denm = self.get_json(f"feeds/denm/{self.ids['pothole']}")["denm"]
+        ended = self.get_json(f"feeds/denm/{self.ids['pothole']}")
         self.zone.do("confirm", id=self.ids["pothole"])
-        self.assertEqual(denm["management"]["termination"], "isNegation")
+        profile.validate(ended)
+        self.assertEqual(ended["denm"]["management"]["termination"], "isNegation")
+
+    def test_the_profiles_refuse_what_is_wrong(self):
+        cifs, denm = json_profile("cifs.json"), json_profile("denm.json")
+        lines = [json.loads(line)["message"] for line in self.get("feeds/denm.ndjson").splitlines()]
+        feed = self.get_json("feeds/cifs.json")
+
+        def changed(document, path, value):
+            copy = json.loads(json.dumps(document))
+            *way, last = path
+            place = copy
+            for step in way:
+                place = place[step]
+            place.pop(last) if value is None else place.__setitem__(last, value)
+            return copy
+
+        incident = ("incidents", 0, "incident")
+        for path, value in ((incident + ("polyline",), "-179.943600 40.443300"), (incident + ("street",), None),
+                            (incident + ("type",), "ROAD_CLOSED"), (incident + ("subtype",), "ACCIDENT_MAJOR"),
+                            (incident + ("starttime",), "2026-01-01 00:00"), (incident + ("direction",), "EAST"),
+                            (incident + ("more",), 1)):
+            self.assertFalse(cifs.is_valid(changed(feed, path, value)), f"CIFS with {path[-1]} {value}")
+        management = ("denm", "management")
+        for path, value in ((management + ("termination",), "isNegation"), (management + ("stationType",), None),
+                            (management + ("eventPosition", "latitude"), 1799436000), (("denm", "location"), None),
+                            (management + ("actionID", "sequenceNumber"), 65536), (management + ("actionId",), {}),
+                            (("denm", "situation", "eventType", "causeCode"), 94),
+                            (("denm", "situation", "informationQuality"), 8), (("denm", "location", "traces"), [])):
+            self.assertFalse(denm.is_valid(changed(lines[0], path, value)), f"DENM with {path[-1]} {value}")
+        text = self.get("feeds/srti.xml").decode()
+        self.assertTrue(datex_profile().validate(etree.fromstring(text.encode())))
+        for old, new in (("latitude>40", "latitude>140"), ("riskOf", "maybe"), ("probable", "maybe"), ("certain", "maybe"),
+                         ('modelBaseVersion="3"', 'modelBaseVersion="2"'), ("sit:GeneralObstruction", "sit:Accident"),
+                         ("wildAnimalsOnTheRoad", "deer"), ("<sit:safetyRelatedMessage>true</sit:safetyRelatedMessage>", ""),
+                         ("sit:validity>", "sit:Validity>"), ("sit:commentType>", "com:commentType>")):
+            if old in text:
+                wrong = etree.fromstring(text.replace(old, new).encode())
+                self.assertFalse(datex_profile().validate(wrong), f"DATEX II with {new} for {old}")
 
     def test_georss(self):
         root = etree.fromstring(self.get("feeds/hazards.atom"))
