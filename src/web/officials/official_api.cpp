@@ -179,6 +179,8 @@ const char* OfficialApi::KindOfSubject(const zone::DecisionRecord& decision) con
     case zone::DecisionKind::kMoveHazard:
     case zone::DecisionKind::kMergeHazard:
     case zone::DecisionKind::kAskFrame:
+    case zone::DecisionKind::kCloseOrder:
+    case zone::DecisionKind::kRetryOrder:
       return "hazard";
     case zone::DecisionKind::kConfirmMapChange:
     case zone::DecisionKind::kDismissMapChange:

@@ -12,6 +12,7 @@ namespace livemap::zone {
 
 /// Bounds of what an official may do at the desk.
 constexpr std::size_t kMaxTeamBytes = 64;
+constexpr std::size_t kMaxOrderBytes = 200;
 constexpr double kMaxMoveM = 200;
 constexpr double kMaxMergeM = 100;
 
@@ -24,6 +25,7 @@ struct DeskAction {
   std::string class_name;    ///< Of a new class.
   geo::GeoPoint position{};  ///< Of a move.
   Uuid other;                ///< Of a merge: the hazard that is gone afterwards.
+  std::string order;         ///< Where it IsOfOrder: which order, to whom, in words.
 };
 
 /// Who mends a hazard until when.

@@ -27,21 +27,28 @@ enum class DecisionKind : std::uint8_t {
   kMergeHazard = 12,    ///< Another hazard is the same one, and gone from the map.
   kAskFrame = 13,       ///< The next vehicle that passes is asked for the whole frame.
   kForgetVehicle = 14,  ///< All that leads to a vehicle was erased; the subject is a pseudonym.
+  kCloseOrder = 15,     ///< A work order of the hazard is done, by the official's word.
+  kRetryOrder = 16,     ///< A work order of the hazard that was given up is sent again.
 };
-constexpr std::size_t kDecisionKinds = 15;
+constexpr std::size_t kDecisionKinds = 17;
 
 /// A decision's text, a comment's above all, has at most so many bytes of valid UTF-8.
 constexpr std::size_t kMaxDecisionTextBytes = 500;
+
+/// Whether the decision is about a work order of the hazard. What was sent cannot be taken back.
+constexpr bool IsOfOrder(DecisionKind kind) {
+  return kind == DecisionKind::kCloseOrder || kind == DecisionKind::kRetryOrder;
+}
 
 /// Whether the decision leaves alone whether the hazard is there (HazardDesk).
 constexpr bool IsOfDesk(DecisionKind kind) {
   return kind == DecisionKind::kComment || kind == DecisionKind::kAssign ||
          kind == DecisionKind::kReclassHazard || kind == DecisionKind::kMoveHazard ||
-         kind == DecisionKind::kMergeHazard || kind == DecisionKind::kAskFrame;
+         kind == DecisionKind::kMergeHazard || kind == DecisionKind::kAskFrame || IsOfOrder(kind);
 }
 
 /// "confirm", "reject", "confirm", "dismiss", "distrust", "undo", "trust", "comment", "assign",
-/// "close", "class", "move", "merge", "frame" or "forget".
+/// "close", "class", "move", "merge", "frame", "forget", "close_order" or "retry_order".
 constexpr const char* DecisionName(DecisionKind kind) {
   switch (kind) {
     case DecisionKind::kConfirmHazard:
@@ -73,6 +80,10 @@ constexpr const char* DecisionName(DecisionKind kind) {
       return "frame";
     case DecisionKind::kForgetVehicle:
       return "forget";
+    case DecisionKind::kCloseOrder:
+      return "close_order";
+    case DecisionKind::kRetryOrder:
+      return "retry_order";
   }
   return "unknown";
 }

@@ -118,6 +118,12 @@ HazardDesk::Slot HazardDesk::SlotOnMap(const Uuid& hazard, const char* which) co
 
 bool HazardDesk::Check(const Uuid& hazard, const DeskAction& action) const {
   CheckDeskText(action);
+  // Also of a hazard that is no longer known: who did it is kept all the same.
+  if (IsOfOrder(action.kind)) {
+    if (protocol::IsAcceptableText(action.order, kMaxOrderBytes)) return true;
+    throw Error("the work order is not accepted: it must be printable UTF-8 of 1 to " +
+                std::to_string(kMaxOrderBytes) + " bytes");
+  }
   if (!state_.hazards.Find(hazard)) return false;
   if (action.kind == DecisionKind::kComment) return true;
   const Slot slot = SlotOnMap(hazard, "the hazard");
@@ -160,7 +166,10 @@ void HazardDesk::CheckMerge(const Uuid& hazard, Slot slot, const DeskAction& act
 HazardDesk::Done HazardDesk::Apply(const Uuid& hazard, const std::string& official,
                                    const DeskAction& action, ZoneTransaction& transaction) {
   DecisionRecord record = MakeDeskRecord(hazard, official, action, transaction.now_ns());
-  if (action.kind == DecisionKind::kComment || action.kind == DecisionKind::kAskFrame) {
+  const bool leaves_hazard_alone = action.kind == DecisionKind::kComment ||
+                                   action.kind == DecisionKind::kAskFrame || IsOfOrder(action.kind);
+  if (leaves_hazard_alone) {
+    record.detail = action.order;
     return {state_.store.WriteDecision(record), {}, 0};
   }
   if (action.kind == DecisionKind::kAssign) return Assign(std::move(record), hazard, action);
@@ -278,9 +287,9 @@ std::optional<DecisionRecord> HazardDesk::MeantBy(const Uuid& hazard,
       if (decision.id != *meant) continue;
       return IsOfDesk(decision.kind) ? std::optional(std::move(decision)) : std::nullopt;
     }
-    const bool leaves_hazard_alone = decision.kind == DecisionKind::kComment ||
-                                     decision.kind == DecisionKind::kAssign ||
-                                     decision.kind == DecisionKind::kAskFrame;
+    const bool leaves_hazard_alone =
+        decision.kind == DecisionKind::kComment || decision.kind == DecisionKind::kAssign ||
+        decision.kind == DecisionKind::kAskFrame || IsOfOrder(decision.kind);
     if (leaves_hazard_alone || decision.kind == DecisionKind::kUndo) continue;
     return IsOfDesk(decision.kind) ? std::optional(std::move(decision)) : std::nullopt;
   }
@@ -288,6 +297,7 @@ std::optional<DecisionRecord> HazardDesk::MeantBy(const Uuid& hazard,
 }
 
 std::optional<std::string> HazardDesk::WhyNotUndoable(const DecisionRecord& decision) const {
+  if (IsOfOrder(decision.kind)) return "what was decided about a work order cannot be taken back";
   const auto hazard = Uuid::Parse(decision.subject);
   const auto slot = hazard ? state_.hazards.Find(*hazard) : std::nullopt;
   if (!slot) return "the hazard is not known any more";

@@ -25,7 +25,7 @@ constexpr char kDecisionColumns[] =
 constexpr char kOfSubject[] = " FROM decisions WHERE subject = :s AND ";
 /// Those that say whether a hazard is there (or what becomes of a map change or a vehicle): no undo
 /// and none of IsOfDesk.
-constexpr char kJudges[] = " AND kind NOT IN (5, 7, 8, 10, 11, 12, 13)";
+constexpr char kJudges[] = " AND kind NOT IN (5, 7, 8, 10, 11, 12, 13, 15, 16)";
 /// As this program writes a uuid: one that no row may have could never be dropped by it.
 std::string IsSoundWithdrawal(const Dialect& dialect) {
   return dialect.IsUuid("hazard_uuid") + " AND " + dialect.AreTexts({{"before", 500}});

@@ -97,6 +97,35 @@ class HazardDeskTest : public ZoneTest {
   std::unique_ptr<ZoneService> zone_;
 };
 
+TEST_F(HazardDeskTest, WhatIsDoneWithAWorkOrderIsKeptAndCannotBeTakenBack) {
+  const Uuid hazard = ReportAt(kDeskPlace);
+  Zone().Confirm(hazard, "Anna");
+  DeskAction retry;
+  retry.kind = DecisionKind::kRetryOrder;
+  EXPECT_THAT(WhyNot(hazard, retry), HasSubstr("work order"));
+  retry.order = "to roads, LM-1";
+  const std::uint64_t id = Act(hazard, retry);
+  Restart();
+  const DecisionRecord kept = Zone().DecisionsAbout(hazard, 10).at(0);
+  EXPECT_EQ(kept.id, id);
+  EXPECT_STREQ(DecisionName(kept.kind), "retry_order");
+  EXPECT_EQ(kept.official, "Anna");
+  EXPECT_EQ(kept.detail, "to roads, LM-1");
+  EXPECT_THROW(Zone().Undo(hazard, "Anna", "", id), DecisionConflict);
+  EXPECT_EQ(Zone().Undo(hazard, "Anna"), ZoneService::Undone::kDone)
+      << "the newest decision that can be undone is the confirmation";
+  EXPECT_EQ(Zone().DecisionsAbout(hazard, 10).at(2).undone_by, id + 1);
+}
+
+TEST_F(HazardDeskTest, WhatIsDoneWithAWorkOrderOfAForgottenHazardIsKept) {
+  DeskAction close;
+  close.kind = DecisionKind::kCloseOrder;
+  close.order = "to roads, LM-1";
+  const Uuid unknown = *Uuid::Parse("11111111-2222-4333-8444-555555555555");
+  EXPECT_NE(Act(unknown, close), 0U);
+  EXPECT_EQ(Zone().DecisionsAbout(unknown, 1).size(), 1U);
+}
+
 TEST_F(HazardDeskTest, ACommentIsKeptWithWhoAndWhenAndCanBeTakenBack) {
   const Uuid hazard = ReportAt(kDeskPlace);
   const std::uint64_t sequence = Zone().Sequence();
