@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "common/uuid.h"
@@ -66,9 +67,19 @@ struct Order {
   std::int64_t uncertain_ns = 0;
   std::int64_t sent_ns = 0;    ///< When the recipient took it; 0: it has not.
   std::int64_t closed_ns = 0;  ///< When the work was done; 0: it is not.
+  std::string closed_by;       ///< By whose word: "its recipient", or an official's name.
   std::string reference;       ///< The recipient's own id of it; empty: it gave none.
   std::string token;           ///< What the recipient gave in place of that, for the time being.
   std::string error;           ///< Why the newest attempt failed; empty: it did not.
+};
+
+/// Which orders are listed: those that all of its members accept.
+struct OrderFilter {
+  std::uint64_t before = UINT64_MAX;  ///< Only lower ids.
+  std::size_t limit = 100;            ///< The newest ones.
+  std::optional<OrderState> state;    ///< None: any.
+  std::string recipient;              ///< Name in the file of work orders; empty: any.
+  std::optional<Uuid> hazard;         ///< None: any.
 };
 
 /// How many orders there are and how old the oldest that waits is.

@@ -45,7 +45,7 @@ Uuid AddConfirmed(ZoneService& zone, const GeoPoint& position) {
 
 std::string OrdersText(const OrderDesk& desk) {
   nlohmann::json list = nlohmann::json::array();
-  for (const Order& order : desk.List(UINT64_MAX, 1000, std::nullopt)) {
+  for (const Order& order : desk.List({UINT64_MAX, 1000, {}, {}, {}})) {
     list.push_back({{"id", order.uuid.ToString()},
                     {"recipient", order.recipient},
                     {"state", OrderStateName(order.state)},

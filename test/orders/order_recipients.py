@@ -11,6 +11,7 @@ Standard input says how it behaves from the next request on, a word a line:
   keep-500     it takes the order and answers 500
   keep-stall   it takes the order and does not answer
   busy         it answers 503 and takes nothing
+  refuse WORDS (webhook) it answers 422 with these words and takes nothing
   token        (open311) it gives a token in place of an id
   close ID     (open311) the work of the request is done
   flood        it takes the order and answers with many megabytes
@@ -88,9 +89,12 @@ class Recipient(http.server.BaseHTTPRequestHandler):
         """Before anything is kept."""
         if Recipient.mode == "die":
             os.kill(os.getpid(), signal.SIGKILL)
-        if Recipient.mode != "busy":
+        if Recipient.mode == "busy":
+            self.answer(503, {})
+        elif Recipient.mode.startswith("refuse "):
+            self.answer(422, Recipient.mode.split(" ", 1)[1].encode(), "text/plain; charset=utf-8")
+        else:
             return False
-        self.answer(503, {})
         return True
 
     def is_answered(self):

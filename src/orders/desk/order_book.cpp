@@ -42,7 +42,7 @@ constexpr char kOrderColumns[] =
     "place, "
     "official, reason, confirmed_ns, state, created_ns, since_ns, next_ns, attempts, CASE WHEN "
     "uncertain_ns <> 0 THEN uncertain_ns ELSE attempt_ns END, sent_ns, closed_ns, reference, "
-    "token, error FROM orders WHERE ";
+    "token, error, closed_by FROM orders WHERE ";
 
 /// None for a row that this program did not write.
 std::optional<Order> OrderOf(const SqliteStatement& row) {
@@ -76,6 +76,7 @@ std::optional<Order> OrderOf(const SqliteStatement& row) {
   order.reference = row.Text(21);
   order.token = row.Text(22);
   order.error = row.Text(23);
+  order.closed_by = row.Text(24);
   return order;
 }
 
@@ -294,14 +295,19 @@ std::optional<Order> OrderBook::Find(const Uuid& uuid) const {
   return find.Step() ? OrderOf(find) : std::nullopt;
 }
 
-std::vector<Order> OrderBook::List(std::uint64_t before, std::size_t limit,
-                                   std::optional<OrderState> state) const {
+std::vector<Order> OrderBook::List(const OrderFilter& filter) const {
   const MutexLock lock(mutex_);
-  SqliteStatement find =
-      database_.Prepare(std::string(kOrderColumns) + "id < ? AND " +
-                        (state ? "state = ?" : "state >= ?") + " ORDER BY id DESC LIMIT ?");
-  find.Bind(1, RowNumber(before)).Bind(2, state ? StateNumber(*state) : std::int64_t{0});
-  find.Bind(3, RowNumber(limit));
+  std::string which = "id < ?";
+  if (filter.state) which += " AND state = ?";
+  if (!filter.recipient.empty()) which += " AND recipient = ?";
+  if (filter.hazard) which += " AND hazard = ?";
+  SqliteStatement find = database_.Prepare(kOrderColumns + which + " ORDER BY id DESC LIMIT ?");
+  int at = 1;
+  find.Bind(at++, RowNumber(filter.before));
+  if (filter.state) find.Bind(at++, StateNumber(*filter.state));
+  if (!filter.recipient.empty()) find.Bind(at++, filter.recipient);
+  if (filter.hazard) find.Bind(at++, filter.hazard->ToString());
+  find.Bind(at, RowNumber(filter.limit));
   std::vector<Order> orders;
   while (find.Step()) {
     if (auto order = OrderOf(find)) orders.push_back(*std::move(order));

@@ -80,10 +80,8 @@ class OrderBook {
   void NoteVerified(std::uint64_t id);
 
   std::optional<Order> Find(const Uuid& uuid) const;
-  /// The newest `limit` whose id is below `before`, in one of the states (none: all), the newest
-  /// first.
-  std::vector<Order> List(std::uint64_t before, std::size_t limit,
-                          std::optional<OrderState> state) const;
+  /// The newest first.
+  std::vector<Order> List(const OrderFilter& filter) const;
   OrderCounts Counts() const;
 
  private:

@@ -156,6 +156,12 @@ bool OrderDesk::Retry(const Uuid& uuid) {
   return is_found;
 }
 
+std::vector<std::string> OrderDesk::RecipientNames() const {
+  std::vector<std::string> names;
+  for (const Recipient& recipient : config_.recipients) names.push_back(recipient.name);
+  return names;
+}
+
 std::array<std::uint64_t, 3> OrderDesk::attempts() const {
   return {attempts_[0], attempts_[1], attempts_[2]};
 }

@@ -40,14 +40,13 @@ class OrderDesk {
   OrderDesk& operator=(const OrderDesk&) = delete;
 
   /// See OrderBook.
-  std::vector<Order> List(std::uint64_t before, std::size_t limit,
-                          std::optional<OrderState> state) const {
-    return book_.List(before, limit, state);
-  }
+  std::vector<Order> List(const OrderFilter& filter) const { return book_.List(filter); }
   std::optional<Order> Find(const Uuid& uuid) const { return book_.Find(uuid); }
   OrderCounts Counts() const { return book_.Counts(); }
   bool Close(const Uuid& uuid, const std::string& by);
   bool Retry(const Uuid& uuid);
+  /// Names of all recipients, in the order of the file of work orders.
+  std::vector<std::string> RecipientNames() const;
 
   /// What came of all attempts since the start, by SendResult::Outcome.
   std::array<std::uint64_t, 3> attempts() const;

@@ -29,6 +29,22 @@ std::string HmacSha256Hex(const std::string& secret, const std::string& text) {
   return hex;
 }
 
+namespace {
+
+constexpr std::size_t kMaxHookWordsBytes = 200;
+
+/// "the recipient answered 422: no such street", with the first line of its answer.
+std::string HookRefusal(const HttpAnswer& answer) {
+  std::string text = "the recipient answered " + std::to_string(answer.status);
+  const std::string words =
+      OneLine(answer.body.substr(0, answer.body.find_first_of("\r\n")), kMaxHookWordsBytes);
+  // A page in HTML is nothing to read in one line.
+  const bool says_why = !words.empty() && words.front() != '<';
+  return says_why ? text + ": " + words : text;
+}
+
+}  // namespace
+
 WebhookSender::WebhookSender(Config config, NetworkClient::Config network, Clock now_ns)
     : config_(std::move(config)), client_(std::move(network)), now_ns_(std::move(now_ns)) {}
 
@@ -52,8 +68,7 @@ SendResult WebhookSender::Send(const Order& order) {
   // A server that breaks down may have kept what it was given.
   const bool is_unknown = answer.status == 0 ? answer.was_sent : answer.status >= 500;
   result.outcome = is_unknown ? SendResult::Outcome::kUnknown : SendResult::Outcome::kRefused;
-  result.error =
-      answer.status == 0 ? answer.error : "the recipient answered " + std::to_string(answer.status);
+  result.error = answer.status == 0 ? answer.error : HookRefusal(answer);
   result.error = WithoutSecret(std::move(result.error), config_.secret);
   return result;
 }

@@ -62,6 +62,11 @@ std::set<State> ParseStates(const std::string& text, const std::array<State, kCo
   return states;
 }
 
+Uuid ParseHazardParameter(const std::string& value) {
+  if (const auto uuid = Uuid::Parse(value)) return *uuid;
+  throw BadRequest("hazard is " + Quoted(value) + ", accepted is the UUID of a hazard");
+}
+
 template <typename Query, typename States>
 Query ParseListQuery(const RequestTarget& target, const States& all_states) {
   RefuseRepeated(target);
@@ -158,10 +163,7 @@ DecisionsQuery ParseDecisionsQuery(const RequestTarget& target) {
     } else if (name == "limit") {
       query.limit = ParseLimit(value, kMaxEventsPerAnswer);
     } else if (name == "hazard") {
-      query.hazard = Uuid::Parse(value);
-      if (!query.hazard) {
-        throw BadRequest("hazard is " + Quoted(value) + ", accepted is the UUID of a hazard");
-      }
+      query.hazard = ParseHazardParameter(value);
     } else {
       RefuseUnknown(name, "accepted are before, limit and hazard");
     }
@@ -172,9 +174,9 @@ DecisionsQuery ParseDecisionsQuery(const RequestTarget& target) {
   return query;
 }
 
-OrdersQuery ParseOrdersQuery(const RequestTarget& target) {
+orders::OrderFilter ParseOrdersQuery(const RequestTarget& target) {
   RefuseRepeated(target);
-  OrdersQuery query;
+  orders::OrderFilter query;
   for (const auto& [name, value] : target.parameters) {
     if (name == "before") {
       query.before = ParseSequence(value);
@@ -184,8 +186,13 @@ OrdersQuery ParseOrdersQuery(const RequestTarget& target) {
       const auto states = ParseStates(value, kAllOrderStates);
       if (states.size() > 1) throw BadRequest("state names several states, accepted is one");
       query.state = *states.begin();
+    } else if (name == "recipient") {
+      if (value.empty()) throw BadRequest("recipient is empty, accepted is a recipient's name");
+      query.recipient = value;
+    } else if (name == "hazard") {
+      query.hazard = ParseHazardParameter(value);
     } else {
-      RefuseUnknown(name, "accepted are before, limit and state");
+      RefuseUnknown(name, "accepted are before, limit, state, recipient and hazard");
     }
   }
   return query;

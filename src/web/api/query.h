@@ -84,15 +84,9 @@ struct DecisionsQuery {
 /// Reads `before`, `limit` and `hazard`; refuses every other parameter.
 DecisionsQuery ParseDecisionsQuery(const RequestTarget& target);
 
-/// What `GET /api/v1/orders` asks for.
-struct OrdersQuery {
-  std::uint64_t before = UINT64_MAX;        ///< Only orders with a lower number.
-  std::size_t limit = 100;                  ///< At most kMaxEventsPerAnswer.
-  std::optional<orders::OrderState> state;  ///< Only orders in this state; none: in any.
-};
-
-/// Reads `before`, `limit` and `state`; refuses every other parameter.
-OrdersQuery ParseOrdersQuery(const RequestTarget& target);
+/// What `GET /api/v1/orders` asks for: reads `before`, `limit` (at most kMaxEventsPerAnswer),
+/// `state`, `recipient` and `hazard`; refuses every other parameter.
+orders::OrderFilter ParseOrdersQuery(const RequestTarget& target);
 
 /// The `since` parameter of `/ws`, which is optional; refuses every other parameter.
 std::optional<std::uint64_t> ParseStreamQuery(const RequestTarget& target);

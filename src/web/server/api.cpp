@@ -64,7 +64,7 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       feeds_({options_, zone, catalogue}),
       ogc_({options_, zone, catalogue}),
       order_desk_(orders),
-      orders_(access_, orders),
+      orders_(access_, zone, orders),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
                 {LimitsOf(options).max_bytes, options.picture_cache_bytes}),
@@ -321,6 +321,7 @@ HttpResponse Api::PageConfig() const {
     config["tiles"] = {{"min_zoom", tiles_->min_zoom()}, {"max_zoom", tiles_->max_zoom()}};
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
   config["officials"] = access_.is_open();
+  config["orders"] = order_desk_ != nullptr;
   config["streets"] = zone_.streets() != nullptr;
   config["view"] = nullptr;
   auto view = zone_.View();

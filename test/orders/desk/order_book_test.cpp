@@ -54,7 +54,7 @@ class OrderBookTest : public testing::Test {
     book_->EndAttempt(order.id, Result(outcome), kBookNowNs, kBookNowNs + kMinuteNs,
                       kBookNowNs + 10 * kMinuteNs);
   }
-  Order Newest() { return book_->List(UINT64_MAX, 1, std::nullopt).at(0); }
+  Order Newest() { return book_->List({UINT64_MAX, 1, {}, {}, {}}).at(0); }
 
   std::string folder_;
   std::uint64_t seed_ = 0;
@@ -84,13 +84,13 @@ TEST_F(OrderBookTest, OnlyItsOwnerMayReadIt) {
 TEST_F(OrderBookTest, AHazardHasOneOpenOrderAtARecipient) {
   book_->Plan({StepWith(hazard_), StepWith(hazard_)}, {1, 1}, kBookNowNs);
   book_->Plan({StepWith(hazard_)}, {2, 1}, kBookNowNs);
-  EXPECT_EQ(book_->List(UINT64_MAX, 10, std::nullopt).size(), 1U);
+  EXPECT_EQ(book_->List({UINT64_MAX, 10, {}, {}, {}}).size(), 1U);
   const Order order = Newest();
   book_->BeginAttempt(order.id, kBookNowNs);
   EndAttempt(order, SendResult::Outcome::kSent);
   ASSERT_TRUE(book_->Close(order.uuid, "miller", kBookNowNs));
   book_->Plan({StepWith(hazard_)}, {3, 1}, kBookNowNs);
-  EXPECT_EQ(book_->List(UINT64_MAX, 10, std::nullopt).size(), 2U) << "it is there again";
+  EXPECT_EQ(book_->List({UINT64_MAX, 10, {}, {}, {}}).size(), 2U) << "it is there again";
 }
 
 TEST_F(OrderBookTest, AnAttemptThatAKillCutOffMayHaveArrived) {
@@ -146,7 +146,8 @@ TEST_F(OrderBookTest, WhatNobodyTriedToSendIsCancelled) {
   book_->Plan({Cancel(other, false)}, {3, 1}, kBookNowNs);
   EXPECT_EQ(Newest().state, OrderState::kWaiting) << "it may have arrived";
   book_->Plan({StepWith(hazard_)}, {4, 1}, kBookNowNs);
-  EXPECT_EQ(book_->List(UINT64_MAX, 10, OrderState::kWaiting).size(), 2U) << "confirmed anew";
+  EXPECT_EQ(book_->List({UINT64_MAX, 10, OrderState::kWaiting, {}, {}}).size(), 2U)
+      << "confirmed anew";
 }
 
 TEST_F(OrderBookTest, AClosedOrdersHazardIsToBeVerifiedUntilItWas) {
@@ -170,7 +171,35 @@ TEST_F(OrderBookTest, CountsByStateAndSaysHowOldTheOldestWaitingIs) {
   book_->Plan({StepWith(hazard_)}, {1, 1}, kBookNowNs);
   EXPECT_EQ(book_->Counts().by_state[0], 1U);
   EXPECT_EQ(book_->Counts().oldest_waiting_ns, kBookNowNs);
-  EXPECT_TRUE(book_->List(Newest().id, 10, std::nullopt).empty());
+  EXPECT_TRUE(book_->List({Newest().id, 10, {}, {}, {}}).empty());
+}
+
+TEST_F(OrderBookTest, ListsThoseThatAllOfTheFilterAccepts) {
+  const Uuid other = *Uuid::Parse("22222222-2222-4333-8444-555555555555");
+  OrderStep step = StepWith(other);
+  step.made[0].recipient = "city' OR 1";
+  book_->Plan({StepWith(hazard_), step}, {1, 1}, kBookNowNs);
+  OrderFilter filter;
+  EXPECT_EQ(book_->List(filter).size(), 2U);
+  filter.recipient = "city' OR 1";
+  ASSERT_EQ(book_->List(filter).size(), 1U);
+  EXPECT_EQ(book_->List(filter)[0].content.hazard, other);
+  filter.hazard = hazard_;
+  EXPECT_TRUE(book_->List(filter).empty()) << "no order is of both";
+  filter.recipient.clear();
+  filter.state = OrderState::kWaiting;
+  EXPECT_EQ(book_->List(filter).size(), 1U);
+  filter.state = OrderState::kSent;
+  EXPECT_TRUE(book_->List(filter).empty());
+}
+
+TEST_F(OrderBookTest, SaysByWhoseWordAnOrderIsClosed) {
+  book_->Plan({StepWith(hazard_)}, {1, 1}, kBookNowNs);
+  book_->BeginAttempt(Newest().id, kBookNowNs);
+  EndAttempt(Newest(), SendResult::Outcome::kSent);
+  EXPECT_EQ(Newest().closed_by, "");
+  EXPECT_TRUE(book_->Close(Newest().uuid, "miller", kBookNowNs));
+  EXPECT_EQ(Newest().closed_by, "miller");
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ class OrderPlannerTest : public zone::ZoneTest {
     }
   }
   std::vector<Order> Orders(std::optional<OrderState> state = std::nullopt) const {
-    return book_->List(UINT64_MAX, kAllOrders, state);
+    return book_->List({UINT64_MAX, kAllOrders, state, {}, {}});
   }
 
   std::uint64_t seed_ = 0;

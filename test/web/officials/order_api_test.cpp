@@ -20,8 +20,9 @@ using testing::Not;
 /// A zone whose orders go to a port at which nobody listens.
 class OrderApiTest : public testing::Test {
  protected:
-  OrderApiTest() {
+  explicit OrderApiTest(double give_up_s = 7 * 86400) {
     orders::WorkOrderConfig config;
+    config.give_up_s = give_up_s;
     orders::Recipient recipient;
     recipient.name = "works";
     recipient.way = orders::WebhookSender::Config{"http://127.0.0.1:1/hook", "top-secret-key"};
@@ -109,6 +110,76 @@ TEST_F(OrderApiTest, WhatCannotBeDoneIsSaid) {
   EXPECT_EQ(Ask("/api/v1/orders?x=1").status, 400);
 }
 
+/// The same, and an order is given up after its first attempt.
+class GivenUpOrderTest : public OrderApiTest {
+ protected:
+  GivenUpOrderTest() : OrderApiTest(0) {}
+};
+
+TEST_F(GivenUpOrderTest, ARetryIsDoneAndStandsInTheAuditTrail) {
+  const nlohmann::json order = FailedOrder();
+  ASSERT_EQ(order["state"], "failed");
+  EXPECT_EQ(order["next_attempt"], nullptr);
+  const std::string id = order["id"];
+  EXPECT_EQ(Post("/api/v1/orders/" + id + "/retry").status, 200);
+  const nlohmann::json decision = Ask("/api/v1/decisions?limit=1").Json()["decisions"][0];
+  EXPECT_EQ(decision["decision"], "retry_order");
+  EXPECT_EQ(decision["official"], TokenFile::official());
+  EXPECT_EQ(decision["subject"], order["hazard"]);
+  EXPECT_EQ(decision["detail"], "to works, LM-" + id);
+  EXPECT_EQ(decision["undone_by"], nullptr);
+}
+
+TEST_F(GivenUpOrderTest, ACloseStandsInTheAuditTrailAndCannotBeTakenBack) {
+  const nlohmann::json order = FailedOrder();
+  const std::string id = order["id"];
+  const HttpResult closed = Post("/api/v1/orders/" + id + "/close");
+  EXPECT_EQ(closed.status, 200);
+  EXPECT_EQ(closed.Json()["state"], "closed");
+  EXPECT_EQ(closed.Json()["closed_by"], TokenFile::official());
+  EXPECT_EQ(Post("/api/v1/orders/" + id + "/close").status, 409) << "closed twice";
+  const nlohmann::json decisions = Ask("/api/v1/decisions").Json()["decisions"];
+  ASSERT_EQ(decisions.size(), 2U) << "what was refused is not in it: " << decisions;
+  EXPECT_EQ(decisions[0]["decision"], "close_order");
+  Headers headers = AsOfficial();
+  headers.emplace_back("Content-Type", "application/json");
+  const std::string hazard = "/api/v1/hazards/" + order["hazard"].get<std::string>();
+  EXPECT_EQ(Request(server_->port(), "POST", hazard + "/undo", headers,
+                    nlohmann::json{{"decision_id", decisions[0]["id"]}}.dump())
+                .status,
+            409);
+  const HttpResult undone = Request(server_->port(), "POST", hazard + "/undo", headers, "{}");
+  EXPECT_EQ(undone.status, 200) << "the confirmation is the newest decision that can be undone";
+  EXPECT_EQ(undone.Json()["properties"]["state"], "candidate");
+}
+
+TEST_F(OrderApiTest, TheListIsOfOneHazardOrRecipientAndNamesTheTeam) {
+  const nlohmann::json order = FailedOrder();
+  const std::string hazard = order["hazard"];
+  EXPECT_EQ(order["team"], nullptr);
+  zone::DeskAction assign;
+  assign.kind = zone::DecisionKind::kAssign;
+  assign.team = "Roads north";
+  assign.due_ns = ZoneFixture::kStartNs - 10 * std::int64_t{86'400'000'000'000};
+  fixture_.zone->Act(*Uuid::Parse(hazard), "miller", assign);
+  const nlohmann::json told = Ask("/api/v1/orders?hazard=" + hazard).Json();
+  ASSERT_EQ(told["orders"].size(), 1U);
+  EXPECT_EQ(told["orders"][0]["team"], "Roads north");
+  EXPECT_EQ(told["orders"][0]["due"], "2025-12-22");
+  EXPECT_EQ(told["orders"][0]["overdue"], true);
+  EXPECT_EQ(told["recipients"], nlohmann::json({"works"}));
+  EXPECT_EQ(told["counts"],
+            nlohmann::json(
+                {{"waiting", 1}, {"sent", 0}, {"closed", 0}, {"failed", 0}, {"cancelled", 0}}));
+  const std::string other = "11111111-2222-4333-8444-555555555555";
+  EXPECT_TRUE(Ask("/api/v1/orders?hazard=" + other).Json()["orders"].empty());
+  EXPECT_EQ(Ask("/api/v1/orders?recipient=works").Json()["orders"].size(), 1U);
+  EXPECT_TRUE(Ask("/api/v1/orders?recipient=else").Json()["orders"].empty());
+  EXPECT_EQ(Ask("/api/v1/orders?recipient=").status, 400);
+  EXPECT_EQ(Ask("/api/v1/orders?hazard=x").status, 400);
+  EXPECT_EQ(Ask("/api/v1/config").Json()["orders"], true);
+}
+
 TEST(OrderApiWithoutOrdersTest, SaysThatThereAreNone) {
   ZoneFixture fixture;
   const TokenFile tokens;
@@ -117,6 +188,7 @@ TEST(OrderApiWithoutOrdersTest, SaysThatThereAreNone) {
   WebServer server(options, *fixture.zone, fixture.catalogue);
   const Headers official{{"Authorization", "Bearer " + TokenFile::token()}};
   EXPECT_EQ(Request(server.port(), "GET", "/api/v1/orders", official, "").status, 404);
+  EXPECT_EQ(Request(server.port(), "GET", "/api/v1/config", {}, "").Json()["orders"], false);
 }
 
 }  // namespace
