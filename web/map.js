@@ -12,6 +12,8 @@ import { Graticule } from './layers/graticule.js';
 import { AreaFilter } from './desk/area_filter.js';
 import { AssignmentList } from './desk/assignment_list.js';
 import { csvOf, geoJsonOf, saveFile } from './desk/export.js';
+import { HazardOrders } from './desk/hazard_orders.js';
+import { OrdersView } from './desk/orders_view.js';
 import { StatisticsView } from './desk/statistics_view.js';
 import { FrameRequests } from './desk/frame_request.js';
 import { HazardHistory } from './desk/time_line.js';
@@ -76,11 +78,16 @@ class Page {
     this.vehicles = new VehicleLayer(this.map, !hasTiles(config) && !config.streets,
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
-      (hazard) => popupContent(hazard, this.catalogue, config.streets,
+      (hazard) => popupContent(hazard, this.catalogue, config.streets, this.repair.rows(hazard),
         [...this.frames.section(hazard), this.history.section(hazard),
           ...this.officials.buttons(hazard, this.work.button(hazard))]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
+    this.repair = new HazardOrders(config.orders, {
+      assignmentOf: (id) => this.assignments.of(id),
+      openId: () => this.layer.popup?.id ?? null,
+      onChange: (id, isFirst) => this.layer.redraw(id, isFirst),
+    });
     this.history = new HazardHistory((id) => this.layer.redraw(id),
       (hazard, id) => this.officials.askUndo(hazard, id));
     this.frames = new FrameRequests((text, hazard, id) => {
@@ -98,6 +105,7 @@ class Page {
     this.officials = new Officials(config.officials && session.role !== 'viewer', (text) => {
       this.say(text);
       this.trail.refresh();
+      this.repair.renew();
       this.assignments.refresh();
     }, (subject, focus) => this.focusPopup(subject, focus));
     this.changes = new ChangeView(this.map, data, (change) => this.officials.changeButtons(change),
@@ -114,7 +122,12 @@ class Page {
     this.assignments = new AssignmentList((ids) => {
       data.showOnly(ids);
       this.showAll();
-    }, (hazard) => this.choose(hazard));
+    }, (hazard) => this.choose(hazard), () => this.layer.redraw(this.layer.popup?.id ?? null, false));
+    this.orders = new OrdersView(config.orders, this.catalogue, (hazard) => this.choose(hazard), (text) => {
+      this.say(text);
+      this.trail.refresh();
+      this.repair.renew();
+    });
     this.area = new AreaFilter(this.map, (corners) => {
       data.showArea(corners);
       this.showAll();

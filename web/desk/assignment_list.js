@@ -12,10 +12,12 @@ const EVERY = '';
 const OVERDUE = ' overdue';
 
 export class AssignmentList {
-  /** `onFilter(ids)` shows only hazards with these ids, all with null; `onChoose(hazard)`. */
-  constructor(onFilter, onChoose) {
+  /** `onFilter(ids)` shows only hazards with these ids, all with null; `onChoose(hazard)`;
+   * `onLoaded()` is called when the assignments are known anew. */
+  constructor(onFilter, onChoose, onLoaded) {
     this.onFilter = onFilter;
     this.onChoose = onChoose;
+    this.onLoaded = onLoaded;
     this.assignments = [];
     this.filtered = null;
     this.section = byId('work-section');
@@ -57,6 +59,7 @@ export class AssignmentList {
     this.select.replaceChildren(...options.map(([value, label]) => element('option', { value }, label)));
     this.select.value = chosen;
     this.show();
+    this.onLoaded();
   }
 
   show() {

@@ -14,7 +14,10 @@ const MOST_EVENTS = 50;
 const MOST_DECISIONS = 50;
 /** Their words stand in the events already. */
 const IN_EVENTS = ['confirm', 'reject', 'close', 'class', 'move', 'undo'];
-const DONE = { comment: 'Comment', assign: 'Assigned', merge: 'Merged', frame: 'Whole frame asked for' };
+const DONE = { comment: 'Comment', assign: 'Assigned', merge: 'Merged', frame: 'Whole frame asked for',
+  close_order: 'Work order closed', retry_order: 'Work order sent again' };
+/** Nothing that was sent can be taken back. */
+export const OF_ORDERS = ['close_order', 'retry_order'];
 
 /** What happened, as {time, nodes}, each source by itself; null where it cannot be had. */
 async function load(hazard) {
@@ -102,7 +105,7 @@ export class HazardHistory {
         .filter((text) => text !== '').join(' ')),
       element('span', { class: 'history-reason' }, [reason, official, isUndone ? 'taken back' : '']
         .filter((text) => text !== '').join(' \u00b7 ')));
-    if (session.decides() && !isUndone) {
+    if (session.decides() && !isUndone && !OF_ORDERS.includes(decision)) {
       const undo = element('button', { class: 'quiet', type: 'button' },
         decision === 'merge' ? 'Split\u2026' : 'Undo\u2026');
       undo.onclick = () => this.onUndo(hazard, id);

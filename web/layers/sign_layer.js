@@ -345,9 +345,9 @@ export class SignLayer {
     if (held && !content.contains(document.activeElement)) this.focusPopup(record.id, name);
   }
 
-  /** Draws the popup anew, as far as its record is known. */
-  redraw(id) {
-    if (this.popup?.id === id) this.fill(this.popup.record, true);
+  /** Draws the popup anew, as far as its record is known; `isSeenWhole` as for fill. */
+  redraw(id, isSeenWhole = true) {
+    if (id !== null && this.popup?.id === id) this.fill(this.popup.record, isSeenWhole);
   }
 
   /** The control of this name in the open popup, else the popup itself. */

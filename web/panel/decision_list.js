@@ -1,6 +1,7 @@
 // What officials decided, the newest first, for those who have logged in. A decision about a hazard
 // that still stands can be taken back here.
 
+import { OF_ORDERS } from '../desk/time_line.js';
 import { byId, element } from '../dom.js';
 import { ago, localTime, plural } from '../format.js';
 import { hazardOf } from '../hazard_record.js';
@@ -13,6 +14,7 @@ const DONE = {
   trust: 'Trusted again', undo: 'Took back a decision about', comment: 'Commented on',
   assign: 'Assigned', close: 'Closed as repaired', class: 'Changed the class of', move: 'Moved',
   merge: 'Merged', frame: 'Asked for a whole frame of', forget: 'Forgot',
+  close_order: 'Closed a work order of', retry_order: 'Sent again a work order of',
 };
 const SUBJECTS = { hazard: 'a hazard', map_change: 'a map change' };
 
@@ -65,7 +67,7 @@ export class DecisionList {
     element('span', { class: 'trail-who' }, [decision.official, decision.reason,
       isUndone ? 'taken back' : ''].filter((text) => text !== '').join(' \u00b7 ')));
     const mayUndo = session.decides() && !isUndone && decision.about === 'hazard'
-      && decision.decision !== 'undo';
+      && decision.decision !== 'undo' && !OF_ORDERS.includes(decision.decision);
     if (mayUndo) {
       const undo = element('button', { class: 'quiet', type: 'button' }, 'Undo\u2026');
       undo.addEventListener('click', () => this.undo(decision));

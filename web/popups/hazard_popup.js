@@ -70,9 +70,10 @@ function streetRows(hazard, hasStreets) {
   return [['Street', streetText(hazard) || unknown, ...note]];
 }
 
-/** The popup's content as a detached element; `extras` are what people can do with the hazard.
+/** The popup's content as a detached element; `more` are further rows of facts, `extras` what people
+ * can do with the hazard.
  * Lists know less of a hazard than it has: what is undefined is shown when it has come. */
-export function popupContent(hazard, catalogue, hasStreets, extras) {
+export function popupContent(hazard, catalogue, hasStreets, more, extras) {
   const sigma = Number.isFinite(hazard.sigma) ? ` \u00b1 ${hazard.sigma.toFixed(1)} m` : '';
   const state = element('span', { class: `state state-${hazard.state}` }, stateLabel(hazard.state));
   const isRejected = hazard.state === REJECTED.name;
@@ -88,6 +89,7 @@ export function popupContent(hazard, catalogue, hasStreets, extras) {
     [isRejected ? 'Seen since' : 'Seen by', seenBy(hazard)],
     ['Confidence', ...bar(hazard.confidence)],
     ...(isRejected ? [] : [['Still there', ...bar(hazard.presence)]]),
+    ...more,
   ];
   return element('article', {
     class: 'popup', role: 'dialog', tabindex: '-1', 'aria-label': hazard.label,

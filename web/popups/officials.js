@@ -14,6 +14,7 @@ const HAZARDS_HISTORY = 'kept in the hazard\u2019s history';
 const CHANGES_HISTORY = 'kept in the map change\u2019s history';
 
 const STAY_EMPTY = 'may stay empty';
+const NO_ANSWER = 'The zone does not answer. Try again in a moment.';
 
 /** `call`: below the subject's address. `bad`: it takes something away, and must say why. `focus`
  * names the button, where `call` does not; `body` is sent besides the reason. `undo` names what
@@ -88,6 +89,21 @@ function credentialsOf(token) {
     : { credentials: 'omit', headers: { Authorization: `Bearer ${token}` } };
 }
 
+/** Retries or closes a work order, as `call` says: {told} or {wrong}, as ask. */
+export async function actOnOrder(id, call) {
+  const { credentials, headers } = credentialsOf(savedToken());
+  let answer;
+  try {
+    answer = await fetch(addressOf(`/api/v1/orders/${encodeURIComponent(id)}/${call}`),
+      { method: 'POST', cache: 'no-store', credentials, headers });
+  } catch (failure) {
+    return { wrong: { status: 0, sentence: NO_ANSWER } };
+  }
+  const told = await answer.json().catch(() => ({}));
+  return answer.ok ? { told }
+    : { wrong: { status: answer.status, sentence: sentenceFor(answer.status, told.error, {}, true) } };
+}
+
 /** Asks the zone as an official: {told} or, in words, what is {wrong: {status, sentence}}. */
 async function ask(subject, { call, none }, token, body = null) {
   let answer;
@@ -99,7 +115,7 @@ async function ask(subject, { call, none }, token, body = null) {
       body: body === null ? undefined : JSON.stringify(body),
     });
   } catch (failure) {
-    return { wrong: { status: 0, sentence: 'The zone does not answer. Try again in a moment.' } };
+    return { wrong: { status: 0, sentence: NO_ANSWER } };
   }
   const told = await answer.json().catch(() => ({}));
   if (answer.ok) return { told };

@@ -22,7 +22,9 @@ CATCH_FILES = """
   HTMLAnchorElement.prototype.click = function click() {};"""
 
 
-class Console(OfficialsPage):
+class ConsolePage(OfficialsPage):
+    """What the tests of the console share."""
+
     open_accounts = log_in_test.LogIn.open_accounts
     log_in, wait_logged_in = log_in_test.LogIn.log_in, log_in_test.LogIn.wait_logged_in
 
@@ -67,6 +69,8 @@ class Console(OfficialsPage):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
 
+
+class Console(ConsolePage):
     def test_a_hostile_comment_stays_text_in_time_line_and_trail(self):
         hazard = self.zone.report("pothole", LAT, LON)
         self.open_as("miller")

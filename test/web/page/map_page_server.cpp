@@ -14,6 +14,11 @@
 //   {"do": "close_decisions"}               the server starts anew without a token file
 //   {"do": "accounts", "public": "all"}     the server starts anew with the accounts jones (viewer)
 //                                           and miller (official)       -> {"password"}
+//   {"do": "orders", "recipients": [{"name": N, "kind": "webhook", "url": URL, "delay_s": S,
+//    "classes": [C]}]}                      the server starts anew with work orders; what fails
+//    once
+//                                           is given up. Kinds and secrets are those of
+//                                           test/orders/order_recipients.py; no classes: all
 //   {"do": "log_out_all"}                   their passwords are set again -> {"password"}
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
 //   {"do": "row", "class": C, "count": N, "lat": D, "lon": D}           hazards 20 m apart, going
@@ -24,7 +29,8 @@
 //   {"do": "stop"} / {"do": "start"}        closes the web server / opens it on the same port
 //   {"do": "connections"}                                               -> {"connections"}
 //   {"do": "certificate"}                   how many were taken since the server's start ->
-//   {"loads"}
+//                                           {"loads"}
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -42,6 +48,7 @@
 #include "accounts/account_store.h"
 #include "common/clock.h"
 #include "common/error.h"
+#include "orders/desk/order_desk.h"
 #include "streets/street_file.h"
 #include "test/web/zone_fixture.h"
 #include "zone/service/erasure_desk.h"
@@ -111,6 +118,7 @@ class Session {
     if (verb == "pass") return Pass(command);
     if (verb == "close_decisions") return CloseDecisions();
     if (verb == "accounts") return OpenAccounts(command);
+    if (verb == "orders") return OpenOrders(command);
     if (verb == "log_out_all") return SetPasswords();
     if (verb == "fill") return Fill(command);
     if (verb == "row") return AddToldRow(command);
@@ -126,8 +134,8 @@ class Session {
 
  private:
   Json Start() {
-    server_ =
-        std::make_unique<livemap::web::WebServer>(options_, *fixture_.zone, fixture_.catalogue);
+    server_ = std::make_unique<livemap::web::WebServer>(options_, *fixture_.zone,
+                                                        fixture_.catalogue, orders_.get());
     options_.port = server_->port();
     return {{"running", true}};
   }
@@ -162,6 +170,35 @@ class Session {
     accounts.Add("miller", livemap::accounts::Role::kOfficial, kPassword, livemap::SystemNs());
     Start();
     return {{"password", kPassword}};
+  }
+
+  Json OpenOrders(const Json& command) {
+    livemap::orders::WorkOrderConfig config;
+    config.give_up_s = 0;
+    for (const Json& wanted : command.at("recipients")) {
+      livemap::orders::Recipient recipient;
+      recipient.name = wanted.at("name");
+      const std::string url = wanted.at("url");
+      if (wanted.at("kind") == "webhook") {
+        recipient.way = livemap::orders::WebhookSender::Config{url, "top-secret-key"};
+      } else {
+        recipient.way =
+            livemap::orders::Open311Sender::Config{url, "city.example", "open-sesame", {}, "001"};
+        recipient.poll_s = 1;
+      }
+      livemap::orders::OrderRule rule;
+      rule.recipient = recipient.name;
+      rule.delay_s = wanted.value("delay_s", 0.0);
+      for (const Json& name : wanted.value("classes", Json::array())) rule.classes.insert(name);
+      config.recipients.push_back(std::move(recipient));
+      config.rules.push_back(std::move(rule));
+    }
+    server_.reset();
+    orders_ = std::make_unique<livemap::orders::OrderDesk>(
+        config, orders_folder_.path(), *fixture_.zone, fixture_.catalogue,
+        [this] { return livemap::SystemNs() + ahead_ns_.load(); }, 1,
+        [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); });
+    return Start();
   }
 
   Json SetPasswords() {
@@ -308,11 +345,13 @@ class Session {
 
   livemap::web::TokenFile tokens_;
   livemap::web::ZoneFixture fixture_;
-  std::int64_t ahead_ns_ = 0;  ///< Of the zone's clock before the system's.
+  std::atomic<std::int64_t> ahead_ns_{0};  ///< Of the zone's clock before the system's.
   livemap::web::TemporaryFolder accounts_folder_;
   int account_files_ = 0;
+  livemap::web::TemporaryFolder orders_folder_;
   livemap::web::WebConfig options_;
   std::optional<livemap::zone::ErasureDesk> erasures_;
+  std::unique_ptr<livemap::orders::OrderDesk> orders_;  ///< Null: the zone has no work orders.
   std::unique_ptr<livemap::web::WebServer> server_;
 };
 

@@ -15,9 +15,8 @@ import sys
 import tarfile
 import unittest
 
-import map_page_log_in_test
 from map_page_fixture import LAT, LON, Keys, run_tests
-from map_page_officials_test import OfficialsPage
+from map_page_orders_test import OrdersPage
 
 AXE, AXE_VERSION = "axe-core", "4.14.1"  # MPL-2.0; it is run here and never shipped
 AXE_SHA512 = "FHfa+lmNjQZfJz1q8wKqIDwC6DExcHt/pkjNQb09a3NPjCKg2rhu5qb2S4r76ASyFNNtuFooJpZe37OgudVGtQ=="
@@ -52,11 +51,7 @@ def axe_source():
         return files.extractfile("package/axe.min.js").read().decode()
 
 
-class Rules(OfficialsPage):
-    open_accounts = map_page_log_in_test.LogIn.open_accounts
-    log_in = map_page_log_in_test.LogIn.log_in
-    wait_logged_in = map_page_log_in_test.LogIn.wait_logged_in
-
+class Rules(OrdersPage):
     @classmethod
     def setUpClass(cls):
         cls.axe = axe_source()
@@ -101,6 +96,35 @@ class Rules(OfficialsPage):
         self.wait(lambda: not self.find("#viewer").is_displayed(), "the viewer stays")
         self.ask("reject")
         self.assert_keeps_the_rules("a decision")
+        self.assert_quiet()
+
+    def test_the_console_keeps_the_rules(self):
+        pothole = self.confirmed("pothole")
+        self.confirmed("debris", LAT + 0.001)
+        self.office.be("refuse the depot is closed")
+        self.confirmed("deer", LAT + 0.002)
+        self.open_as("miller")
+        self.open_orders()
+        self.wait_for_orders(5, "Failed", "Waiting", "Open at the recipient")
+        self.assert_keeps_the_rules("the work orders")
+        self.click('#orders-list [data-focus^="close"]')
+        self.wait_for('#orders-list [data-focus^="done"]')
+        self.assert_keeps_the_rules("the question before a close")
+        self.click("#orders-close")
+        self.click("#select-section summary")
+        self.click("#statistics-open")
+        self.wait_for(".statistics")
+        self.assert_keeps_the_rules("the statistics")
+        self.click("#statistics-close")
+        self.start_work(pothole, "assign")
+        self.assert_keeps_the_rules("the desk's dialog")
+        self.write("#work-team", "Roads north")
+        self.save_work()
+        if self.size[0] < 600:
+            self.open_sheet()
+        self.open_popup_of(pothole)
+        self.wait_for_text(".popup", "Roads north", "Open at the recipient")
+        self.assert_keeps_the_rules("a hazard with its team and orders")
         self.assert_quiet()
 
 
