@@ -15,16 +15,19 @@ import threading
 import unittest
 import urllib.request
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "support"))
+import postgresql_server  # noqa: E402
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SERVER = sys.argv.pop(1)
 LAT, LON = 40.4433, -79.9436
 
 
 class Zone:
-    """A real zone with its store in `directory` and its web server."""
+    """A real zone with its store in `directory`, or a database of PostgreSQL, and its web server."""
 
-    def __init__(self, directory):
-        self.process = subprocess.Popen([SERVER, "", "", directory], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    def __init__(self, directory, store_url=""):
+        self.process = subprocess.Popen([SERVER, "", "", directory, store_url], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.port = json.loads(self.process.stdout.readline())["port"]
 
     def report(self, class_name, north, vehicle="car-1"):
@@ -45,6 +48,9 @@ class Zone:
 
 
 class StoreCopy(unittest.TestCase):
+    def database(self, directory):
+        """The URL of the database in place of the folder's zone.sqlite3; none here."""
+
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="livemap_store_copy_")
         self.addCleanup(folder.cleanup)
@@ -52,13 +58,14 @@ class StoreCopy(unittest.TestCase):
         self.store, self.copy, self.other = (self.folder / name for name in ("zone", "copy", "other"))
 
     def zone_in(self, directory):
-        zone = Zone(str(directory))
+        zone = Zone(str(directory), self.database(directory) or "")
         self.addCleanup(lambda: zone.process.poll() is None and zone.close())
         return zone
 
     def run_it(self, command, directory):
-        return subprocess.run([ROOT / "scripts/livemap_zone_store", command, self.copy, "--directory", directory], text=True,
-                              capture_output=True, timeout=120, check=False)
+        url = self.database(directory)
+        return subprocess.run([ROOT / "scripts/livemap_zone_store", command, self.copy, "--directory", directory,
+                               *(["--store-url", url] if url else [])], text=True, capture_output=True, timeout=120, check=False)
 
     def assert_done(self, result):
         self.assertEqual((result.returncode, result.stderr), (0, ""), result)
@@ -124,12 +131,18 @@ class StoreCopy(unittest.TestCase):
         zone.close()
         self.assert_refused(self.run_it("restore", self.store), "holds zone.sqlite3")
 
+    def test_a_url_with_a_password_is_refused(self):
+        result = subprocess.run([ROOT / "scripts/livemap_zone_store", "backup", self.copy, "--store-url",
+                                 "postgresql://zone:secret@db/livemap"], text=True, capture_output=True, timeout=60, check=False)
+        self.assert_refused(result, "password", ".pgpass")
+        self.assertNotIn("secret", result.stderr)
+
     def test_what_is_no_store_and_no_copy_is_said(self):
         self.assert_refused(self.run_it("backup", self.store), "holds no store")
         self.assert_refused(self.run_it("restore", self.other), "no copy of a store")
         self.copy.mkdir()
         (self.copy / "backup.json").write_text('{"format": 99}')
-        self.assert_refused(self.run_it("restore", self.other), "format 1")
+        self.assert_refused(self.run_it("restore", self.other), "formats 1 and 2")
 
     def test_a_damaged_copy_is_not_restored(self):
         self.zone_in(self.store).report("pothole", 0)
@@ -152,6 +165,54 @@ class StoreCopy(unittest.TestCase):
         self.assertFalse(part.exists())
         with sqlite3.connect(self.copy / "zone.sqlite3") as database:
             self.assertEqual(database.execute("SELECT count(*) FROM hazards").fetchone(), (1,))
+
+
+@unittest.skipUnless(postgresql_server.programs(), "skipped, no PostgreSQL server installed")
+class StoreCopyOnPostgresql(StoreCopy):
+    """The same with the zone's rows in a server, and what differs there."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.server = postgresql_server.PostgresqlServer()
+        cls.addClassCleanup(cls.server.close)
+
+    def database(self, directory):
+        name = f"{self.id().rsplit('.', 1)[-1]}_{directory.name}"[-60:]
+        if self.server.ask("postgres", f"SELECT count(*) FROM pg_database WHERE datname = '{name}'") == "0":
+            self.server.make_database(name)
+        return self.server.url(name)
+
+    def test_a_store_is_never_overwritten(self):
+        zone = self.zone_in(self.store)
+        zone.report("pothole", 0)
+        self.assert_done(self.run_it("backup", self.store))
+        self.assert_refused(self.run_it("restore", self.store), "holds a store", "never overwritten")
+
+    def test_a_damaged_copy_is_not_restored(self):
+        self.zone_in(self.store).report("pothole", 0)
+        self.assert_done(self.run_it("backup", self.store))
+        dump = self.copy / "zone.pgdump"
+        dump.write_bytes(dump.read_bytes()[:-200])
+        self.assertEqual(self.run_it("restore", self.other).returncode, 2)
+        self.assertEqual(self.server.ask(self.database(self.other).split("/")[3].split("?")[0],
+                                         "SELECT to_regclass('livemap_schema') IS NULL"), "t")
+
+    def test_an_interrupted_copy_is_no_copy_and_is_made_anew(self):
+        self.zone_in(self.store).report("pothole", 0)
+        part = self.folder / "copy.part"
+        part.mkdir()
+        (part / "zone.pgdump").write_text("half")
+        self.assert_refused(self.run_it("restore", self.other), "no copy of a store")
+        self.assert_done(self.run_it("backup", self.store))
+        self.assertFalse(part.exists())
+        self.assertEqual(json.loads((self.copy / "backup.json").read_text())["hazards"], 1)
+
+    def test_a_copy_goes_to_no_other_kind_of_store(self):
+        self.zone_in(self.store).report("pothole", 0)
+        self.assert_done(self.run_it("backup", self.store))
+        result = subprocess.run([ROOT / "scripts/livemap_zone_store", "restore", self.copy, "--directory", self.other], text=True,
+                                capture_output=True, timeout=60, check=False)
+        self.assert_refused(result, "of a store in PostgreSQL", "--store-url")
 
 
 if __name__ == "__main__":

@@ -16,10 +16,11 @@ namespace livemap::zone {
 
 /// A place that a WriteStatement reads each time when it is run. The place outlives the statement.
 struct BoundPlace {
-  BoundPlace(std::string& text) : value(&text) {}    // NOLINT(google-explicit-constructor)
-  BoundPlace(double& number) : value(&number) {}     // NOLINT(google-explicit-constructor)
-  BoundPlace(long long& number) : value(&number) {}  // NOLINT(google-explicit-constructor)
-  BoundPlace(int& number) : value(&number) {}        // NOLINT(google-explicit-constructor)
+  // Not explicit: statements list their places.
+  BoundPlace(std::string& text) : value(&text) {}
+  BoundPlace(double& number) : value(&number) {}
+  BoundPlace(long long& number) : value(&number) {}
+  BoundPlace(int& number) : value(&number) {}
   BoundPlace(int& number, soci::indicator& is_there) : value(&number), indicator(&is_there) {}
 
   std::variant<std::string*, double*, long long*, int*> value;

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -132,30 +131,6 @@ TEST_F(PostgresqlStoreTest, NothingCommittedIsLostOrDoubledWhenTheServerIsKilled
     EXPECT_EQ(zone.Handle(report).status, protocol::Receipt::Status::kCommitted);
   }
   EXPECT_EQ(zone.Statistics().repeated, reports.size()) << "each was there, once";
-}
-
-TEST_F(PostgresqlStoreTest, ACommitWhoseAnswerWasLostCountsWhenItCameToPass) {
-  ZoneService zone(OnServer(), Clock(), 1);
-  zone.Handle(MakeReport({1, 1}));
-  // From now on a commit is on the disk, but the server answers only when a standby has it, too.
-  StoreProbe(url_).Execute("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
-  StoreProbe(url_).Execute("SELECT pg_reload_conf()");
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  const protocol::Report report = MakeReport({1, 1});
-  std::atomic<bool> is_committed{false};
-  std::thread writer(
-      [&] { is_committed = zone.Handle(report).status == protocol::Receipt::Status::kCommitted; });
-  StoreProbe probe(url_);
-  while (probe.Number("SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == 0) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  server_->Kill(SIGKILL);
-  server_->Start("-c synchronous_standby_names=");
-  writer.join();
-  EXPECT_TRUE(is_committed);
-  zone.Handle(MakeReport({1, 1}));
-  EXPECT_EQ(zone.Statistics().store_errors, 0U);
-  ExpectConsistent(3);
 }
 
 TEST_F(PostgresqlStoreTest, AHistoryIsReadAgainAfterTheServerWasKilled) {
