@@ -23,7 +23,7 @@ std::vector<std::uint8_t> OnePixelPng() {
 }
 
 ZoneFixture::ZoneFixture(std::shared_ptr<const streets::StreetMap> streets,
-                         const std::string& directory)
+                         const std::string& directory, const std::string& store_url)
     : directory_(directory.empty() ? folder_.path() : directory),
       // A store that stays knows the identifiers of an earlier run.
       generator_(directory.empty() ? 7 : std::random_device{}()) {
@@ -34,6 +34,7 @@ ZoneFixture::ZoneFixture(std::shared_ptr<const streets::StreetMap> streets,
   config.map_changes_per_hour = 1e9;
   config.max_hazards_by_one_vehicle = 1'000'000;
   config.directory = directory_;
+  config.store_url = store_url;
   config.catalogue = catalogue;
   config.streets = std::move(streets);
   zone = std::make_unique<zone::ZoneService>(

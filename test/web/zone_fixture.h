@@ -52,9 +52,9 @@ class ZoneFixture {
   static constexpr std::int64_t kStartNs = 1'767'225'600'000'000'000;  // 2026-01-01T00:00:00Z
 
   /// `streets`: those that the zone knows; null: none. `directory`: where its store is and stays;
-  /// empty: in a folder that goes away with it.
+  /// empty: in a folder that goes away with it. `store_url`: as ZoneConfig's.
   explicit ZoneFixture(std::shared_ptr<const streets::StreetMap> streets = nullptr,
-                       const std::string& directory = "");
+                       const std::string& directory = "", const std::string& store_url = "");
 
   /// A report that the zone accepts, without a picture.
   protocol::Report MakeReport(const std::string& class_name, const geo::GeoPoint& position);

@@ -27,7 +27,7 @@ class Zone:
     """A real zone with its store in `directory`, or a database of PostgreSQL, and its web server."""
 
     def __init__(self, directory, store_url=""):
-        self.process = subprocess.Popen([SERVER, "", "", directory, store_url], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen([SERVER, "", "", directory, "", "", store_url], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.port = json.loads(self.process.stdout.readline())["port"]
 
     def report(self, class_name, north, vehicle="car-1"):

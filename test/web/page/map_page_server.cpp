@@ -1,7 +1,8 @@
 // A real zone and its real web server for the browser tests and for pictures of the page. Its
 // arguments, if any, are the zone's street file, a file of tiles, a folder for the store, which
-// stays, and the files of a certificate and its key; empty ones count as none. It takes one JSON
-// command per line on standard input and answers each with one line of JSON:
+// stays, the files of a certificate and its key, and a URL of PostgreSQL for the store; empty ones
+// count as none. It takes one JSON command per line on standard input and answers each with one
+// line of JSON:
 //
 //   {"do": "report", "class": C, "lat": D, "lon": D, "picture": true, "vehicle": V, "label": L}
 //                                                                       -> {"id", "status",
@@ -92,8 +93,9 @@ constexpr char kPassword[] = "correct horse battery";
 class Session {
  public:
   Session(std::shared_ptr<const livemap::streets::StreetMap> streets, std::string tile_file,
-          const std::string& directory, std::string certificate_file, std::string key_file)
-      : fixture_(std::move(streets), directory) {
+          const std::string& directory, std::string certificate_file, std::string key_file,
+          const std::string& store_url)
+      : fixture_(std::move(streets), directory, store_url) {
     options_ = livemap::web::TestOptions();
     options_.token_file = tokens_.path();
     options_.tile_file = std::move(tile_file);
@@ -365,7 +367,8 @@ int main(int argc, char** argv) {
           livemap::streets::ReadStreetFile(argv[1]));
     }
     const auto argument = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
-    Session session(std::move(streets), argument(2), argument(3), argument(4), argument(5));
+    Session session(std::move(streets), argument(2), argument(3), argument(4), argument(5),
+                    argument(6));
     std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
               << std::endl;
     std::string line;
