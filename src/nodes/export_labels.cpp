@@ -6,11 +6,12 @@
 
 #include "common/error.h"
 #include "zone/labels/label_export.h"
+#include "zone/store/postgresql_url.h"
 
 namespace {
 
 constexpr char kExportHelp[] =
-    R"(usage: ./livemap zone export-labels DIR [--directory DIRECTORY]
+    R"(usage: ./livemap zone export-labels DIR [--directory DIRECTORY] [--store-url URL]
 
 Writes the pictures of hazards about which officials decided, with labels, as training/train_detector.py
 --own DIR takes them. A confirmed hazard is labelled by its box. A rejected one is background. One in the
@@ -21,22 +22,26 @@ the drawn lines.
 
   DIR                    a new or an empty folder
   --directory DIRECTORY  folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
+  --store-url URL        database of PostgreSQL that keeps the store, as the zone's store_url:=URL
 )";
 
 struct ExportArguments {
   std::string out;
   std::string directory;
+  std::string store_url;
 };
 
 /// Throws Error for what is not accepted.
 ExportArguments ParseExport(const std::vector<std::string>& words) {
   ExportArguments arguments;
   for (std::size_t i = 0; i < words.size(); ++i) {
-    if (words[i] == "--directory") {
-      if (i + 1 == words.size()) throw livemap::Error("--directory needs a value");
-      arguments.directory = words[++i];
+    if (words[i] == "--directory" || words[i] == "--store-url") {
+      const std::string& flag = words[i];
+      if (i + 1 == words.size()) throw livemap::Error(flag + " needs a value");
+      (flag == "--directory" ? arguments.directory : arguments.store_url) = words[++i];
     } else if (words[i].compare(0, 2, "--") == 0) {
-      throw livemap::Error("unknown flag '" + words[i] + "', accepted is --directory");
+      throw livemap::Error("unknown flag '" + words[i] +
+                           "', accepted are --directory and --store-url");
     } else if (!arguments.out.empty()) {
       throw livemap::Error("'" + words[i] + "' was given too, accepted is one folder");
     } else {
@@ -50,6 +55,7 @@ ExportArguments ParseExport(const std::vector<std::string>& words) {
     const char* const home = std::getenv("HOME");
     arguments.directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
   }
+  if (!arguments.store_url.empty()) livemap::zone::CheckedPostgresqlUrl(arguments.store_url);
   return arguments;
 }
 
@@ -78,7 +84,8 @@ int main(int argc, char** argv) {
   }
   try {
     const ExportArguments arguments = ParseExport(words);
-    Tell(livemap::zone::ExportLabels(arguments.directory, arguments.out), arguments.out);
+    Tell(livemap::zone::ExportLabels(arguments.directory, arguments.out, arguments.store_url),
+         arguments.out);
     return 0;
   } catch (const std::exception& error) {
     std::cerr << "livemap zone export-labels: " << error.what() << '\n';

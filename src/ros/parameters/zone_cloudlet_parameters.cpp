@@ -6,6 +6,7 @@
 
 #include "ros/parameters/shared/datum_parameter.h"
 #include "ros/parameters/shared/shared_parameters.h"
+#include "zone/store/postgresql_url.h"
 
 namespace livemap::ros_io {
 namespace {
@@ -427,6 +428,12 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   if (config.zone.directory.empty()) {
     throw Error("parameter 'directory' is empty, accepted is the folder of the zone's store");
   }
+  parameters.Read("store_url", config.zone.store_url,
+                  "Database of PostgreSQL that keeps the store in place of the file zone.sqlite3 "
+                  "in `directory`: postgresql://USER@HOST/DATABASE, without a password "
+                  "(docs/how-to/use-postgresql.md). Empty: that file. zone.launch sets it by the "
+                  "argument `store_url`.");
+  if (!config.zone.store_url.empty()) zone::CheckedPostgresqlUrl(config.zone.store_url);
   parameters.Read(
       "hazards", config.hazards,
       "Path of the catalogue of classes: radius, colour, label and more. Empty: "
