@@ -28,6 +28,11 @@ void FixBaseline::AddFix(const geo::Fix& fix) {
   if (fixes_.size() > kFixesWaiting) fixes_.pop_front();
 }
 
+void FixBaseline::Stretch(double factor) {
+  for (Pose& pose : poses_) pose.world_from_camera.translation() *= factor;
+  if (anchor_) anchor_->world_from_camera.translation() *= factor;
+}
+
 void FixBaseline::Reset() {
   poses_.clear();
   fixes_.clear();

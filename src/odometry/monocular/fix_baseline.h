@@ -43,6 +43,8 @@ class FixBaseline {
   void AddFix(const geo::Fix& fix);
   /// The next distance that is sure enough; none where there is none yet.
   std::optional<Measurement> Measure();
+  /// What the poses so far have as 1 is `factor` in the unit of those to come.
+  void Stretch(double factor);
   /// The map or the path is another one now.
   void Reset();
 

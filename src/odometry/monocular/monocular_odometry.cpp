@@ -387,15 +387,20 @@ void MonocularOdometry::MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isome
   const bool better_tells = source_ == MetresSource::kWheels || source_ == MetresSource::kReceiver;
   if (better_tells || !(measured->units > 0 && measured->metres > 0)) return;
   const bool by_height = log_height_ && Seconds(now_ns_ - height_told_ns_) <= config_.source_age_s;
+  const double scale_before = scale_.metres_per_unit();
   if (by_height) {
     const double relative = measured->sigma_m / measured->metres;
     TeachHeight(std::log(measured->metres / measured->units),
                 relative * relative + kBaselineSigma * kBaselineSigma);
     HasTold(MetresSource::kFixes, std::sqrt(height_variance_));
-    return;
+  } else {
+    scale_.Measure(measured->metres, measured->sigma_m, measured->units / scale_before);
+    HasTold(MetresSource::kFixes, 0);
   }
-  scale_.Measure(measured->metres, measured->sigma_m, measured->units / scale_.metres_per_unit());
-  HasTold(MetresSource::kFixes, 0);
+  // The next distance begins with steps that were made before: they were as wrong.
+  const double factor = scale_.metres_per_unit() / scale_before;
+  path_.translation() *= factor;
+  fixes_.Stretch(factor);
 }
 
 /// Whether the path is none of a car.

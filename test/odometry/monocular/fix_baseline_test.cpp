@@ -62,6 +62,35 @@ TEST(FixBaseline, MeasuresTheUnitOverWaysThatAreLongAgainstTheFixesErrors) {
   EXPECT_LT(mean, 2.5);
 }
 
+TEST(FixBaseline, AWayMayBeginInOneUnitAndEndInAnother) {
+  FixBaseline baseline({});
+  const auto fix_at = [](int i) {
+    geo::Fix fix;
+    fix.stamp_ns = BaselineStamp(i);
+    fix.position = geo::LocalFrame({48.8566, 9.0}).ToGeo({0, 10.0 * i});
+    fix.covariance_m2 = 0.01 * Eigen::Matrix2d::Identity();
+    return fix;
+  };
+  const auto pose_at = [](double z) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.translation().z() = z;
+    return pose;
+  };
+  // 10 m are 4 units; poses come between the fixes, too.
+  for (int i = 0; i <= 3; ++i) baseline.AddPose(BaselineStamp(0.5 * i), pose_at(2.0 * i));
+  baseline.AddFix(fix_at(0));
+  baseline.AddFix(fix_at(1));
+  const auto first = baseline.Measure();
+  ASSERT_TRUE(first);
+  EXPECT_NEAR(first->metres / first->units, kMetresPerUnit, 1e-3);
+  baseline.Stretch(kMetresPerUnit);
+  baseline.AddPose(BaselineStamp(2), pose_at(20));
+  baseline.AddFix(fix_at(2));
+  const auto second = baseline.Measure();
+  ASSERT_TRUE(second);
+  EXPECT_NEAR(second->metres / second->units, 1, 1e-3);
+}
+
 TEST(FixBaseline, AStandingVehicleTellsNothing) {
   FixBaseline baseline({});
   BaselineDrive drive(1.0);
