@@ -18,8 +18,8 @@
 namespace livemap::test {
 
 /// A server of PostgreSQL for this process: its data in a temporary folder, reached by a socket in
-/// it alone, with the settings of a fresh installation. It ends with the object, and with the thread
-/// that started it, however that ends.
+/// it alone, with the settings of a fresh installation. It ends with the object, and with the
+/// thread that started it, however that ends.
 ///
 /// Typical usage:
 ///

@@ -120,8 +120,8 @@ void ZoneService::ForgetRows(const Pseudonyms& names, ErasureWalk& walk) {
   if (part == ErasureWalk::Part::kPlaces) places_.Forget(names.vehicle_id());
 }
 
-/// Answers of before schema 9 do not say which picture they came with. A hazard about which the vehicle was asked, and
-/// whose picture is of no report, may show one of them.
+/// Answers of before schema 9 do not say which picture they came with. A hazard about which the
+/// vehicle was asked, and whose picture is of no report, may show one of them.
 void ZoneService::ForgetAnswerPictures(ErasureWalk& walk) {
   if (walk.answered.empty()) return;
   Slot next = 0;

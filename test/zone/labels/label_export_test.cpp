@@ -104,7 +104,8 @@ TEST_F(LabelExportTest, WhatWasUndoneIsNoDecision) {
   zone_->Confirm(hazard, "miller");
   zone_->Reject(hazard, "jones", "a shadow");
   zone_->Undo(hazard, "jones");
-  EXPECT_EQ(ExportLabels(directory_ + "/zone", Out(), store_url_).boxes, 1U) << "the confirmation stands";
+  EXPECT_EQ(ExportLabels(directory_ + "/zone", Out(), store_url_).boxes, 1U)
+      << "the confirmation stands";
 }
 
 TEST_F(LabelExportTest, CountsWhatIsLeftOut) {

@@ -1,4 +1,4 @@
-#include "web/access/account_api.h"
+#include "web/officials/account_api.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
