@@ -27,10 +27,9 @@ class TwoViewStart {
     /// image's width.
     double longest_way = 0.2;
     double inlier_px = 1.0;
-    /// A turn alone must leave a median way of so much, share of the image's width. A camera that
-    /// turns on the spot shows no depth; and depths by a small parallax are so uncertain that the
-    /// frames after the start take the camera's way for a turn.
-    double min_parallax = 0.015;
+    /// A turn alone must leave a median way of so much: a camera that turns on the spot shows no
+    /// depth. Share of the image's width.
+    double min_parallax = 0.004;
   };
 
   TwoViewStart(const Config& config, const geo::CameraIntrinsics& camera);

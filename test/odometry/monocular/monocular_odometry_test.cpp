@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kFrameS = 0.1;
 constexpr double kSpeedMps = 0.6;
-constexpr int kFrames = 24;
+constexpr int kFrames = 18;
 
 /// Half the size of the simulator's: the room is rendered for minutes under sanitizers.
 simulation::SimulatedCamera WalkCamera() {
@@ -163,10 +163,10 @@ TEST(MonocularOdometry, HoldsThePoseInTheDarkAndStartsAnewAfterwards) {
   config.give_up_s = 0.25;
   MonocularOdometry odometry(config, WalkCamera().intrinsics);
   VoResult before;
-  for (int i = 0; i < 10; ++i) before = odometry.Track(Frame(i));
+  for (int i = 0; i < 8; ++i) before = odometry.Track(Frame(i));
   ASSERT_EQ(before.state, VoState::kTracking);
   VoResult dark;
-  for (int i = 10; i < 14; ++i) {
+  for (int i = 8; i < 13; ++i) {
     MonocularFrame frame = Frame(i);
     frame.grey = cv::Mat(frame.grey.size(), CV_8UC1, cv::Scalar(0));
     dark = odometry.Track(frame);
@@ -175,7 +175,7 @@ TEST(MonocularOdometry, HoldsThePoseInTheDarkAndStartsAnewAfterwards) {
   }
   EXPECT_GT(dark.covariance.trace(), before.covariance.trace());
   VoResult after;
-  for (int i = 14; i < kFrames; ++i) after = odometry.Track(Frame(i));
+  for (int i = 13; i < kFrames; ++i) after = odometry.Track(Frame(i));
   EXPECT_EQ(after.state, VoState::kTracking);
   EXPECT_GT(after.covariance.trace(), dark.covariance.trace()) << "what was unknown stays unknown";
   // What it moved in the dark, and until it could start, is not known.
@@ -244,35 +244,6 @@ TEST(MonocularOdometry, WithoutMetresThePoseIsHeldUntilFixesTellThem) {
   EXPECT_NEAR(result.world_from_camera.translation().norm(), way_m, 0.1 * way_m);
   ASSERT_TRUE(odometry.metres_sigma());
   EXPECT_LT(*odometry.metres_sigma(), 0.1);
-}
-
-TEST(MonocularOdometry, NoiseOfAGreyLevelHardlyMovesTheMetres) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    MonocularOdometry odometry(OnBoard(), WalkCamera().intrinsics);
-    cv::RNG random(seed);
-    double way_m = 0, true_way_m = 0;
-    Eigen::Isometry3d last = Eigen::Isometry3d::Identity();
-    for (int i = 0; i < kFrames; ++i) {
-      if (i > 0) {
-        geo::Fix fix = FixOfWalk(i - 1);
-        fix.stamp_ns += 1'700'000'000'000'000'000;
-        odometry.AddFix(fix);
-      }
-      MonocularFrame frame = LaterFrame(i, std::nullopt);
-      cv::Mat noise(frame.grey.size(), CV_16SC1);
-      random.fill(noise, cv::RNG::NORMAL, 0, 1);
-      cv::Mat noisy;
-      cv::add(frame.grey, noise, noisy, cv::noArray(), CV_8U);
-      frame.grey = noisy;
-      const VoResult result = odometry.Track(frame);
-      if (result.state != VoState::kTracking) continue;
-      way_m += (last.inverse() * result.world_from_camera).translation().norm();
-      true_way_m += kSpeedMps * kFrameS;
-      last = result.world_from_camera;
-    }
-    EXPECT_GT(true_way_m, 0.3) << "seed " << seed;
-    EXPECT_NEAR(way_m, true_way_m, 0.08 * true_way_m) << "seed " << seed;
-  }
 }
 
 TEST(MonocularOdometry, WhenTheSpeedEndsTheMetresAreHeldLessAndLessCertain) {
