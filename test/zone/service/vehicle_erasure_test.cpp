@@ -104,11 +104,7 @@ class VehicleErasureTest : public ZoneTest {
     for (int shift = 56; shift >= 0; shift -= 8) bytes += static_cast<char>(key >> shift & 0xFF);
     return {std::to_string(key), bytes};
   }
-  std::string Select(const std::string& sql) const {
-    SqliteDatabase database(DatabasePath(), true);
-    SqliteStatement query = database.Prepare(sql);
-    return query.Step() ? query.Text(0) : "";
-  }
+  std::string Select(const std::string& sql) const { return Probe().Text(sql); }
   std::map<std::string, std::string> Map() {
     std::map<std::string, std::string> map;
     for (const Hazard& hazard : Zone().Query(std::nullopt, 0, 1000)) {
@@ -147,12 +143,14 @@ TEST_F(VehicleErasureTest, NothingInTheStoreLeadsToTheVehicleAndTheMapStays) {
   ASSERT_TRUE(Zone().Distrust(kErased, "miller", "car-erika lies, car-erika2 does not"));
   ASSERT_TRUE(Zone().Trust(kErased, "miller"));
   const auto map = Map();
-  const std::string key = "'" + std::to_string(VehicleKey(kErased)) + "'";
+  const std::string has_key = " LIKE '%" + std::to_string(VehicleKey(kErased)) + "%'";
   const std::string with_evidence =
-      Select("SELECT (SELECT count(*) FROM hazards WHERE instr(life, " + key +
-             ") > 0) + (SELECT count(*) FROM map_changes WHERE instr(witnesses, " + key + ") > 0)");
+      Select("SELECT (SELECT count(*) FROM hazards WHERE life" + has_key +
+             ") + (SELECT count(*) FROM map_changes WHERE witnesses" + has_key + ")");
   ASSERT_GE(std::stoi(with_evidence), 4) << "hazards and a map change";
-  ASSERT_THAT(FilesWith(kErased), Not(testing::IsEmpty())) << "else the test finds nothing anyway";
+  if (!IsOnPostgresql()) {
+    ASSERT_THAT(FilesWith(kErased), Not(testing::IsEmpty())) << "else it finds nothing anyway";
+  }
 
   const ErasureCounts counts = Forget();
   EXPECT_EQ(counts.reports, 5U);
@@ -174,7 +172,7 @@ TEST_F(VehicleErasureTest, NothingInTheStoreLeadsToTheVehicleAndTheMapStays) {
     EXPECT_THAT(decision.reason, Not(HasSubstr("car-erika ")));
   }
   // Another vehicle whose name begins with it is not touched.
-  EXPECT_THAT(FilesWith("car-erika2"), Not(testing::IsEmpty()));
+  EXPECT_TRUE(IsOnPostgresql() || !FilesWith("car-erika2").empty());
   zone_.reset();
   EXPECT_EQ(Map(), map) << "after a restart";
   EXPECT_EQ(Zone().Statistics().store_damage.rows, 0U) << Zone().Statistics().store_damage.first;
@@ -238,16 +236,9 @@ TEST_F(VehicleErasureTest, AnUndoOfADecisionOfBeforeLeavesTheHazardAsItWas) {
 
 TEST_F(VehicleErasureTest, OneThatWasCutOffGoesOn) {
   for (int place = 0; place < 5; ++place) ReportBy(kErased, place, true);
-  {
-    SqliteDatabase saboteur(DatabasePath(), true);
-    saboteur.Execute(
-        "CREATE TRIGGER no_space BEFORE DELETE ON places BEGIN SELECT RAISE(ABORT, 'full'); END");
-  }
+  Probe().Refuse("DELETE", "places", "full");
   EXPECT_THROW(Forget(), StoreError);
-  {
-    SqliteDatabase saboteur(DatabasePath(), true);
-    saboteur.Execute("DROP TRIGGER no_space");
-  }
+  Probe().Accept("places");
   zone_.reset();
   Forget();
   EXPECT_THAT(FilesWith("erika"), testing::IsEmpty());
