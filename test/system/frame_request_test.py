@@ -108,7 +108,9 @@ class FrameRequestTest(unittest.TestCase):
         told = self.json(f"api/v1/hazards/{hazard}/sightings")
         self.assertEqual([one["image"] for one in told["answers"] if one["whole_frame"]], [picture["image"]])
         report = next(one["image"] for one in told["sightings"] if one["image"])
-        self.assertEqual(self.size_of(report)[0], CROP_PX, "a report's picture")
+        # Smaller where so many pixels do not fit into a report's bytes.
+        width = self.size_of(report)[0]
+        self.assertTrue(CROP_PX / 2 < width <= CROP_PX, f"a report's picture has {width} pixels")
         self.assertGreater(whole[0], CROP_PX, "the camera's whole image")
         self.assertAlmostEqual(whole[0] / whole[1], 640 / 400, 1)
         sizes = [path.stat().st_size for path in (self.directory / "zone" / "images").rglob("*.jpeg")]
