@@ -27,7 +27,7 @@ class PictureViewer {
       previous: button('viewer-previous', '\u2039', 'Newer picture', 'ArrowLeft'),
       next: button('viewer-next', '\u203a', 'Older picture', 'ArrowRight'),
       out: button('viewer-out', '\u2212', 'Smaller', '-'),
-      fit: button('viewer-fit', 'Fit', 'Whole picture', '0'),
+      fit: button('viewer-fit', 'Fit', 'Fit the whole picture', '0'),
       in: button('viewer-in', '+', 'Larger', '+'),
       close: button('viewer-close', 'Close', 'Close the pictures', 'Escape'),
     };
