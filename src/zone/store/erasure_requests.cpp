@@ -71,9 +71,10 @@ std::int64_t ErasureRequests::Add(const std::string& vehicle_id, const std::stri
   RequireErasureName("the name of who asks", by);
   const MutexLock lock(mutex_);
   std::int64_t id = 0;
-  database_->Transaction([&] {
-    database_
-        ->Prepare(
+  SqliteDatabase& database = *database_;
+  database.Transaction([&] {
+    database
+        .Prepare(
             "INSERT INTO erasures (vehicle_id, secret, asked_by, asked_ns, done_ns, reports, "
             "answers, hazards, pictures, places, refusal) VALUES (?, ?, ?, ?, 0, 0, 0, 0, 0, 0, "
             "'')")
@@ -82,7 +83,7 @@ std::int64_t ErasureRequests::Add(const std::string& vehicle_id, const std::stri
         .Bind(3, by)
         .Bind(4, now_ns)
         .Execute();
-    SqliteStatement query = database_->Prepare("SELECT last_insert_rowid()");
+    SqliteStatement query = database.Prepare("SELECT last_insert_rowid()");
     query.Step();
     id = query.Int(0);
   });
