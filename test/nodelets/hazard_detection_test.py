@@ -25,7 +25,8 @@ from node_testing import SOURCE_DIRECTORY, NodeletUnderTest, eventually, paramet
 TINY_MODEL = os.path.join(SOURCE_DIRECTORY, "test", "perception", "inference", "tiny.yaml")
 WIDTH, HEIGHT = 64, 48
 RED, GREEN = (0, 0, 255), (0, 255, 0)
-BURST = 400
+# No more than the nodelet's queue of answers holds, which a subscriber that gets no processor time lets fill up.
+BURST = 100
 
 
 def image(number, *blocks):
