@@ -11,6 +11,9 @@ endif()
 # as in Release, with line tables only.
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 
+# A library on the line that a program does not use is not loaded when it starts: libtorch takes half a second.
+add_link_options(-Wl,--as-needed)
+
 # The sources of a target are compiled as a few, since their headers cost more than they do. Names in
 # anonymous namespaces have to differ then within a module, and within a program of tests.
 if(LIVEMAP_UNITY)
