@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -17,9 +18,9 @@
 
 namespace livemap::test {
 
-/// A server of PostgreSQL for this process: its data in a temporary folder, reached by a socket in
-/// it alone, with the settings of a fresh installation. It ends with the object, and with the
-/// thread that started it, however that ends.
+/// A server of PostgreSQL for this process: its data in a folder that it removes, reached by a
+/// socket in it alone, with the settings of a fresh installation. It ends with the object, and with
+/// the thread that started it, however that ends.
 ///
 /// Typical usage:
 ///
@@ -32,7 +33,7 @@ class PostgresqlServer {
 
   PostgresqlServer() {
     namespace fs = std::filesystem;
-    std::string pattern = (fs::temp_directory_path() / "livemap_postgresql_XXXXXX").string();
+    std::string pattern = (RoomyFolder() / "livemap_postgresql_XXXXXX").string();
     folder_ = mkdtemp(pattern.data());
     if (const passwd* user = Somebody()) {
       if (chown(folder_.c_str(), user->pw_uid, user->pw_gid) != 0) Fail("no folder");
@@ -102,6 +103,17 @@ class PostgresqlServer {
     throw std::runtime_error("PostgreSQL for tests: " + why);
   }
 
+  /// In memory where that has room: each database that is dropped waits until all is on disk, which
+  /// no test looks at.
+  static std::filesystem::path RoomyFolder() {
+    namespace fs = std::filesystem;
+    constexpr std::uintmax_t kEnough = 1 << 30;
+    const fs::path memory = "/dev/shm";
+    std::error_code error;
+    const fs::space_info space = fs::space(memory, error);
+    const bool is_usable = !error && space.available >= kEnough && access("/dev/shm", W_OK) == 0;
+    return is_usable ? memory : fs::temp_directory_path();
+  }
   /// The folder of the newest version's programs.
   static std::optional<std::string> Programs() {
     namespace fs = std::filesystem;
