@@ -14,11 +14,12 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
-#include "protocol/hazard_catalogue.h"
 #include "zone/pictures/owned_directory.h"
 #include "zone/service/erasure_desk.h"
 #include "zone/service/zone_service.h"
 #include "zone/store/erasure_requests.h"
+#include "zone/store/postgresql_url.h"
+#include "zone/store/zone_store.h"
 
 namespace {
 
@@ -27,7 +28,7 @@ using livemap::zone::ErasureCounts;
 using livemap::zone::ErasureRequests;
 
 constexpr char kHelp[] =
-    R"(usage: ./livemap zone forget VEHICLE [--directory DIR] [--by NAME]
+    R"(usage: ./livemap zone forget VEHICLE [--directory DIR] [--store-url URL] [--by NAME]
 
 Erases all that leads to the vehicle from the zone's store, also while the zone runs: its name in
 reports, answers and decisions gives way to random ones, where it was is dropped, and its pictures
@@ -36,13 +37,23 @@ vehicle out first (livemap zone revoke): what it tells afterwards is a new vehic
 
   --by NAME         who asks, for the audit trail (default: the user who calls)
   --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
+  --store-url URL   database of PostgreSQL that keeps the store, as the zone's store_url:=URL; a
+                    running zone knows its own
 )";
 
 struct Arguments {
   std::string vehicle;
   std::string directory;
+  std::string store_url;
   std::string by;
 };
+
+std::string Caller() {
+  const char* const sudo = std::getenv("SUDO_USER");
+  if (sudo != nullptr && *sudo != '\0') return sudo;
+  const passwd* const user = getpwuid(geteuid());
+  return user == nullptr ? std::to_string(geteuid()) : user->pw_name;
+}
 
 /// Throws Error for what is not accepted.
 Arguments Parse(const std::vector<std::string>& words) {
@@ -52,9 +63,11 @@ Arguments Parse(const std::vector<std::string>& words) {
     std::string* value = nullptr;
     if (words[i] == "--by") value = &arguments.by;
     if (words[i] == "--directory") value = &arguments.directory;
+    if (words[i] == "--store-url") value = &arguments.store_url;
     if (value == nullptr) {
       if (words[i].compare(0, 2, "--") == 0) {
-        throw Error("unknown flag '" + words[i] + "', accepted are --by and --directory");
+        throw Error("unknown flag '" + words[i] +
+                    "', accepted are --by, --directory and --store-url");
       }
       places.push_back(words[i]);
       continue;
@@ -66,39 +79,58 @@ Arguments Parse(const std::vector<std::string>& words) {
     throw Error(std::to_string(places.size()) + " vehicles were given, accepted is one");
   }
   arguments.vehicle = places[0];
+  if (arguments.directory.empty()) {
+    const char* const home = std::getenv("HOME");
+    arguments.directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
+  }
+  if (arguments.by.empty()) arguments.by = Caller();
+  if (!arguments.store_url.empty()) {
+    arguments.store_url = livemap::zone::CheckedPostgresqlUrl(arguments.store_url);
+  }
   return arguments;
 }
 
-std::string Caller() {
-  const char* const sudo = std::getenv("SUDO_USER");
-  if (sudo != nullptr && *sudo != '\0') return sudo;
-  const passwd* const user = getpwuid(geteuid());
-  return user == nullptr ? std::to_string(geteuid()) : user->pw_name;
-}
-
-/// The folder of a store that there is: what was mistyped would look like a zone that has
-/// forgotten.
-std::string StoreFolder(std::string directory) {
-  if (directory.empty()) {
-    const char* const home = std::getenv("HOME");
-    directory = std::string(home == nullptr ? "" : home) + "/.livemap/zone";
+/// Throws Error where there is neither a store nor a running zone: what was mistyped would look
+/// like a zone that has forgotten.
+void RequireStore(const Arguments& arguments) {
+  const std::string& directory = arguments.directory;
+  if (!std::filesystem::is_directory(directory)) {
+    throw Error("there is no folder '" + directory +
+                "', accepted is the folder of the zone's store");
   }
-  if (std::filesystem::is_regular_file(directory + "/zone.sqlite3")) return directory;
+  if (!arguments.store_url.empty()) {
+    if (livemap::zone::HoldsStore(arguments.store_url)) return;
+    throw Error("'" + arguments.store_url + "' holds no store, accepted is the zone's store_url");
+  }
+  if (livemap::zone::HoldsStore(directory + "/zone.sqlite3")) return;
   throw Error("there is no zone.sqlite3 in '" + directory +
-              "', accepted is the folder of the zone's store");
+              "' and no zone runs in it; accepted is the folder of the zone's store, with "
+              "--store-url where PostgreSQL keeps it");
 }
 
-/// Null while a zone has the folder for itself.
-std::unique_ptr<livemap::zone::ZoneService> OpenStore(const std::string& directory) {
+/// Null while a zone has the folder for itself. Throws Error where there is no store.
+std::unique_ptr<livemap::zone::ZoneService> OpenStore(const Arguments& arguments) {
+  RequireStore(arguments);
   livemap::zone::ZoneConfig config;
-  config.directory = directory;
+  config.directory = arguments.directory;
+  config.store_url = arguments.store_url;
   // Nothing goes for other reasons.
   config.image_cap_bytes = 1e15;
   try {
     return std::make_unique<livemap::zone::ZoneService>(config, livemap::SystemNs, 1);
-  } catch (const livemap::StoreError& error) {
-    if (std::string(error.what()).find("is in use by another zone") == std::string::npos) throw;
+  } catch (const livemap::zone::DirectoryInUse&) {
     return nullptr;
+  }
+}
+
+/// Only what there is already is looked at: asking leaves nothing in a mistyped folder.
+bool ZoneRunsIn(const std::string& directory) {
+  if (!std::filesystem::exists(directory + "/zone.lock")) return false;
+  try {
+    const livemap::zone::OwnedDirectory free(directory);
+    return false;
+  } catch (const livemap::zone::DirectoryInUse&) {
+    return true;
   }
 }
 
@@ -112,20 +144,20 @@ ErasureRequests::Outcome AwaitZone(const ErasureRequests& requests, std::int64_t
 }
 
 ErasureRequests::Outcome Forget(const Arguments& arguments) {
-  const std::string directory = StoreFolder(arguments.directory);
-  ErasureRequests requests(ErasureRequests::PathIn(directory));
-  const std::int64_t id = requests.Add(
-      arguments.vehicle, arguments.by.empty() ? Caller() : arguments.by, livemap::SystemNs());
-  auto zone = OpenStore(directory);
+  auto zone = ZoneRunsIn(arguments.directory) ? nullptr : OpenStore(arguments);
+  ErasureRequests requests(ErasureRequests::PathIn(arguments.directory));
+  const std::int64_t id = requests.Add(arguments.vehicle, arguments.by, livemap::SystemNs());
   if (!zone) return AwaitZone(requests, id);
   while (!requests.Find(id)) {
     livemap::zone::WorkOffErasure(requests, *zone, livemap::SystemNs());
   }
   zone.reset();
-  // What an older version dropped may still stand in free pages.
-  livemap::SqliteDatabase database(directory + "/zone.sqlite3", true);
-  database.Execute("VACUUM");
-  database.Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  if (arguments.store_url.empty()) {
+    // What an older version dropped may still stand in free pages.
+    livemap::SqliteDatabase database(arguments.directory + "/zone.sqlite3", true);
+    database.Execute("VACUUM");
+    database.Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  }
   return *requests.Find(id);
 }
 

@@ -8,8 +8,6 @@
 #include <cstring>
 #include <filesystem>
 
-#include "common/sqlite.h"
-
 namespace livemap::zone {
 
 OwnedDirectory::OwnedDirectory(const std::string& path) : path_(path) {
@@ -26,7 +24,7 @@ OwnedDirectory::OwnedDirectory(const std::string& path) : path_(path) {
   }
   if (flock(lock_file_, LOCK_EX | LOCK_NB) != 0) {
     close(lock_file_);
-    throw StoreError("store: directory '" + path + "' is in use by another zone");
+    throw DirectoryInUse("store: directory '" + path + "' is in use by another zone");
   }
 }
 

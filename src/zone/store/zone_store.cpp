@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <random>
 #include <thread>
 #include <utility>
@@ -69,6 +70,18 @@ StoreConnection& PrepareZoneStore(StoreConnection& connection, const std::string
 }
 
 }  // namespace
+
+bool HoldsStore(const std::string& database) {
+  if (!IsPostgresqlUrl(database)) return std::filesystem::is_regular_file(database);
+  return ExplainStore("looking for a store in '" + database + "'", [&] {
+    StoreConnection connection(database, StoreConnection::Use::kRead);
+    int tables = 0;
+    connection.session() << "SELECT CASE WHEN to_regclass('livemap_schema') IS NULL THEN 0 ELSE 1 "
+                            "END",
+        soci::into(tables);
+    return tables == 1;
+  });
+}
 
 /// Owns the connection that writes, and makes a new one where that to a server has broken.
 ///

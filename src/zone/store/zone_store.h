@@ -34,6 +34,13 @@ struct Withdrawal {
   std::string before;  ///< PackPresence.
 };
 
+/// Whether the database, named as for ZoneStore's constructor, holds a store. Makes nothing. Throws
+/// StoreError when the server does not say.
+///
+/// Typical usage:
+///   if (!HoldsStore(url)) throw Error("'" + url + "' holds no store");
+bool HoldsStore(const std::string& database);
+
 /// The zone's database: hazards as they are, every accepted report and answer, every event, what
 /// was learned of classes and of vehicles, where each vehicle was, and the same of map changes.
 /// Through SOCI in SQLite, in WAL mode with synchronous=FULL, or in PostgreSQL with
