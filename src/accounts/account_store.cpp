@@ -19,9 +19,11 @@ namespace livemap::accounts {
 namespace {
 
 constexpr std::array<Role, 3> kRoles{Role::kViewer, Role::kOfficial, Role::kAdmin};
-constexpr std::array<AccountEventKind, 6> kAccountEventKinds{
+constexpr std::array<AccountEventKind, 10> kAccountEventKinds{
     AccountEventKind::kLogIn, AccountEventKind::kWrongPassword, AccountEventKind::kLogOut,
-    AccountEventKind::kLock,  AccountEventKind::kUnlock,        AccountEventKind::kEndSessions};
+    AccountEventKind::kLock,  AccountEventKind::kUnlock,        AccountEventKind::kEndSessions,
+    AccountEventKind::kAdd,   AccountEventKind::kRole,          AccountEventKind::kSetPassword,
+    AccountEventKind::kRemove};
 constexpr std::size_t kTokenBytes = 32;
 const std::vector<std::string>& Migrations() {
   // Two programs that open a new file at once both make its tables.
@@ -38,7 +40,9 @@ const std::vector<std::string>& Migrations() {
       "CREATE TABLE IF NOT EXISTS locked (name TEXT PRIMARY KEY REFERENCES accounts (name) ON "
       "DELETE CASCADE) WITHOUT ROWID;"
       "CREATE TABLE IF NOT EXISTS account_events (id INTEGER PRIMARY KEY, kind TEXT NOT NULL, name "
-      "TEXT NOT NULL, done_by TEXT NOT NULL, client TEXT NOT NULL, at_ns INTEGER NOT NULL);"};
+      "TEXT NOT NULL, done_by TEXT NOT NULL, client TEXT NOT NULL, at_ns INTEGER NOT NULL);",
+      "CREATE TABLE IF NOT EXISTS account_event_roles (id INTEGER PRIMARY KEY REFERENCES "
+      "account_events (id) ON DELETE CASCADE, role TEXT NOT NULL);"};
   return migrations;
 }
 
@@ -107,6 +111,14 @@ const char* AccountEventName(AccountEventKind kind) {
       return "unlock";
     case AccountEventKind::kEndSessions:
       return "end_sessions";
+    case AccountEventKind::kAdd:
+      return "add";
+    case AccountEventKind::kRole:
+      return "role";
+    case AccountEventKind::kSetPassword:
+      return "set_password";
+    case AccountEventKind::kRemove:
+      return "remove";
   }
   return "unknown";
 }
@@ -242,6 +254,11 @@ void AccountStore::Note(const AccountEvent& event) {
         .Bind(4, event.client)
         .Bind(5, event.at_ns)
         .Execute();
+    if (event.role) {
+      database_->Prepare("INSERT INTO account_event_roles VALUES (last_insert_rowid(), ?)")
+          .Bind(1, std::string(RoleName(*event.role)))
+          .Execute();
+    }
     database_
         ->Prepare("DELETE FROM account_events WHERE id <= (SELECT max(id) FROM account_events) - ?")
         .Bind(1, static_cast<std::int64_t>(kMaxEvents))
@@ -254,8 +271,8 @@ std::vector<AccountEvent> AccountStore::Events(std::uint64_t before, std::size_t
   const MutexLock lock(mutex_);
   std::vector<AccountEvent> events;
   auto query = database_->Prepare(
-      "SELECT id, kind, name, done_by, client, at_ns FROM account_events WHERE id < ? ORDER BY id "
-      "DESC LIMIT ?");
+      "SELECT id, kind, name, done_by, client, at_ns, coalesce(role, '') FROM account_events LEFT "
+      "JOIN account_event_roles USING (id) WHERE id < ? ORDER BY id DESC LIMIT ?");
   query.Bind(1, static_cast<std::int64_t>(std::min(before, most)))
       .Bind(2, static_cast<std::int64_t>(std::min<std::uint64_t>(limit, most)));
   while (query.Step()) {
@@ -265,7 +282,7 @@ std::vector<AccountEvent> AccountStore::Events(std::uint64_t before, std::size_t
                      [&](AccountEventKind one) { return kind == AccountEventName(one); });
     if (known == kAccountEventKinds.end()) continue;  // A newer version's.
     events.push_back({static_cast<std::uint64_t>(query.Int(0)), *known, query.Text(2),
-                      query.Text(3), query.Text(4), query.Int(5)});
+                      query.Text(3), query.Text(4), query.Int(5), RoleOf(query.Text(6))});
   }
   return events;
 }

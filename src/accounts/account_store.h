@@ -43,9 +43,14 @@ enum class AccountEventKind {
   kLogOut,
   kLock,
   kUnlock,
-  kEndSessions
+  kEndSessions,
+  kAdd,
+  kRole,
+  kSetPassword,
+  kRemove
 };
-/// "log_in", "wrong_password", "log_out", "lock", "unlock" or "end_sessions".
+/// "log_in", "wrong_password", "log_out", "lock", "unlock", "end_sessions", "add", "role",
+/// "set_password" or "remove".
 const char* AccountEventName(AccountEventKind kind);
 
 /// One line of the trail of log-ins.
@@ -56,6 +61,8 @@ struct AccountEvent {
   std::string by;      ///< Who did it: the account itself, or an admin.
   std::string client;  ///< From where: an address or its network; empty: this machine's shell.
   std::int64_t at_ns = 0;
+  std::optional<Role> role =
+      std::nullopt;  ///< What the account has been since; of kAdd and kRole alone.
 };
 
 /// Who has logged in.

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 namespace {
 
 using livemap::Error;
+using livemap::accounts::AccountEventKind;
 using livemap::accounts::AccountStore;
 using livemap::accounts::Role;
 
@@ -30,10 +32,10 @@ constexpr char kHelp[] =
        ./livemap zone user list [--directory DIR]
 
 The people who may log in to the zone's map. A viewer sees vehicles and unconfirmed hazards, an
-official also decides, an admin also sees who logs in, ends sessions and locks accounts. What is
-changed holds at once, also while the zone runs; a new password, a lock and a removal end all
-sessions. The password is asked for twice, or read from the first line of standard input where that
-is no terminal.
+official also decides, an admin also sees who logs in and manages the accounts. What is changed holds
+at once, also while the zone runs; a new password, a lock and a removal end all sessions. The
+password is asked for twice, or read from the first line of standard input where that is no
+terminal.
 
   --role ROLE       what the person may do
   --directory DIR   folder of the zone's store, as the zone's directory:=DIR (default ~/.livemap/zone)
@@ -161,31 +163,34 @@ AccountStore Open(const Arguments& arguments) {
 void Run(const Arguments& arguments) {
   const std::int64_t now_ns = livemap::SystemNs();
   const std::string& name = arguments.name;
+  if (arguments.action == "list") return List(Open(arguments));
+  const bool has_role = arguments.action == "add" || arguments.action == "role";
+  const std::optional<Role> role =
+      has_role ? std::optional(RequireRole(arguments.role)) : std::nullopt;
+  AccountStore accounts = Open(arguments);
+  AccountEventKind done = AccountEventKind::kRemove;
   if (arguments.action == "add") {
-    const Role role = RequireRole(arguments.role);
-    Open(arguments).Add(name, role, ReadPassword(), now_ns);
-    std::cout << "added " << name << " as " << livemap::accounts::RoleName(role) << '\n';
+    done = AccountEventKind::kAdd;
+    accounts.Add(name, *role, ReadPassword(), now_ns);
+    std::cout << "added " << name << " as " << arguments.role << '\n';
   } else if (arguments.action == "passwd") {
-    Open(arguments).SetPassword(name, ReadPassword(), now_ns);
+    done = AccountEventKind::kSetPassword;
+    accounts.SetPassword(name, ReadPassword(), now_ns);
     std::cout << name << " has a new password\n";
   } else if (arguments.action == "role") {
-    Open(arguments).SetRole(name, RequireRole(arguments.role));
+    done = AccountEventKind::kRole;
+    accounts.SetRole(name, *role);
     std::cout << name << " is " << arguments.role << " from now on\n";
   } else if (arguments.action == "remove") {
-    Open(arguments).Remove(name);
+    accounts.Remove(name);
     std::cout << "removed " << name << '\n';
-  } else if (arguments.action == "lock" || arguments.action == "unlock") {
-    const bool locks = arguments.action == "lock";
-    AccountStore accounts = Open(arguments);
-    accounts.SetLocked(name, locks);
-    accounts.Note({0,
-                   locks ? livemap::accounts::AccountEventKind::kLock
-                         : livemap::accounts::AccountEventKind::kUnlock,
-                   name, Caller(), "", now_ns});
-    std::cout << arguments.action << "ed " << name << '\n';
   } else {
-    List(Open(arguments));
+    const bool locks = arguments.action == "lock";
+    done = locks ? AccountEventKind::kLock : AccountEventKind::kUnlock;
+    accounts.SetLocked(name, locks);
+    std::cout << arguments.action << "ed " << name << '\n';
   }
+  accounts.Note({0, done, name, Caller(), "", now_ns, role});
 }
 
 }  // namespace

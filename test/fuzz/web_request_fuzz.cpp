@@ -13,6 +13,7 @@
 #include "web/http/gzip_stream.h"
 #include "web/http/origin.h"
 #include "web/http/static_files.h"
+#include "web/officials/account_body.h"
 #include "web/officials/desk_body.h"
 #include "web/officials/official_decision.h"
 #include "web/ogc/ogc_query.h"
@@ -141,6 +142,19 @@ void CheckDecision(const std::string& text) {
       Require(livemap::geo::IsValid(action.position));
     } catch (const livemap::web::BadRequest&) {
       // Refused.
+    }
+  }
+  for (const auto action :
+       {livemap::accounts::AccountEventKind::kAdd, livemap::accounts::AccountEventKind::kRole,
+        livemap::accounts::AccountEventKind::kSetPassword,
+        livemap::accounts::AccountEventKind::kRemove}) {
+    try {
+      const livemap::web::AccountBody body = livemap::web::ParseAccountBody(action, text);
+      Require(body.name.size() <= text.size() && body.password.size() <= text.size());
+      Require(body.role.has_value() == (action == livemap::accounts::AccountEventKind::kAdd ||
+                                        action == livemap::accounts::AccountEventKind::kRole));
+    } catch (const livemap::web::BadRequest& mistake) {
+      Require(std::string(mistake.what()).find("accepted") != std::string::npos);
     }
   }
   static livemap::web::OfficialAuthenticator gate({{"miller", std::string(64, 'a')}});

@@ -22,12 +22,6 @@ HttpResponse Unauthorized(const std::string& sentence) {
   return answer;
 }
 
-HttpResponse TooMany(const std::string& sentence) {
-  HttpResponse answer = MakeErrorAnswer(429, sentence);
-  answer.headers.emplace_back("Retry-After", "60");
-  return answer;
-}
-
 /// Whoever can read an answer to the session knows it; a page of another origin cannot.
 std::string CsrfTokenOf(const std::string& session_token) {
   return Sha256Hex("csrf " + session_token);
@@ -72,6 +66,12 @@ class Turn {
 };
 
 }  // namespace
+
+HttpResponse TooMany(const std::string& sentence) {
+  HttpResponse answer = MakeErrorAnswer(429, sentence);
+  answer.headers.emplace_back("Retry-After", "60");
+  return answer;
+}
 
 HttpResponse LogInFirst() { return Unauthorized("log in to see this"); }
 
@@ -178,6 +178,12 @@ std::optional<HttpResponse> Access::WhyNotAdmin(const HttpRequest& question,
   }
   admin = person->name;
   return std::nullopt;
+}
+
+HttpResponse Access::HashInTurn(const std::function<HttpResponse()>& work) {
+  const Turn turn(hashes_);
+  if (!turn.is_mine()) return MakeBusyAnswer("another password is looked at just now");
+  return work();
 }
 
 void Access::Note(accounts::AccountEventKind kind, const std::string& name,

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -42,6 +43,9 @@ class Access {
   /// None where the request may do in the name of `admin` what is about the zone itself, else the
   /// refusal: only somebody who has logged in may, no program by a token.
   std::optional<HttpResponse> WhyNotAdmin(const HttpRequest& question, std::string& admin) const;
+  /// Runs `work`, which hashes a password, and returns its answer. While another password is hashed
+  /// it is not run, and the answer is a refusal: each takes 64 MiB.
+  HttpResponse HashInTurn(const std::function<HttpResponse()>& work);
   /// Null where the zone keeps no accounts.
   accounts::AccountStore* accounts() { return accounts_ ? &*accounts_ : nullptr; }
 
@@ -79,6 +83,9 @@ class Access {
   /// By client and by account, "c:NAME" and "a:NAME".
   KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
 };
+
+/// Status 429, to be asked again in a minute.
+HttpResponse TooMany(const std::string& sentence);
 
 /// Status 401: reading this needs a log-in.
 HttpResponse LogInFirst();

@@ -1,16 +1,20 @@
 #include "web/officials/account_api.h"
 
-#include <nlohmann/json.hpp>
+#include <map>
 #include <optional>
 #include <utility>
 
 #include "common/clock.h"
+#include "common/error.h"
+#include "common/sqlite.h"
 #include "web/api/query.h"
 #include "web/http/request_body.h"
 #include "web/json/json.h"
 
 namespace livemap::web {
 namespace {
+
+using accounts::AccountEventKind;
 
 constexpr std::string_view kAccountEvents = "/events";
 
@@ -21,23 +25,39 @@ HttpResponse AccountMethodNotAllowed(const char* accepted) {
   return answer;
 }
 
-/// None where the body is anything but {"name": TEXT}.
-std::optional<std::string> ParseAccountName(const std::string& body) {
-  const auto json = nlohmann::json::parse(body, nullptr, false);
-  if (!json.is_object() || json.size() != 1) return std::nullopt;
-  const auto name = json.find("name");
-  if (name == json.end() || !name->is_string()) return std::nullopt;
-  return name->get<std::string>();
+std::optional<AccountEventKind> ActionOf(std::string_view what) {
+  static const std::map<std::string_view, AccountEventKind> actions{
+      {"/add", AccountEventKind::kAdd},
+      {"/role", AccountEventKind::kRole},
+      {"/password", AccountEventKind::kSetPassword},
+      {"/remove", AccountEventKind::kRemove},
+      {"/lock", AccountEventKind::kLock},
+      {"/unlock", AccountEventKind::kUnlock},
+      {"/end_sessions", AccountEventKind::kEndSessions}};
+  const auto found = actions.find(what);
+  return found == actions.end() ? std::nullopt : std::optional(found->second);
 }
 
-std::optional<accounts::AccountEventKind> ActionOf(std::string_view what) {
-  if (what == "/lock") return accounts::AccountEventKind::kLock;
-  if (what == "/unlock") return accounts::AccountEventKind::kUnlock;
-  if (what == "/end_sessions") return accounts::AccountEventKind::kEndSessions;
-  return std::nullopt;
+/// What would leave the admin without the own rights: the last admin would lock everybody out.
+const char* WhyNotOnOwnAccount(AccountEventKind action) {
+  switch (action) {
+    case AccountEventKind::kLock:
+      return "nobody may lock the own account";
+    case AccountEventKind::kRole:
+      return "nobody may change the own role";
+    case AccountEventKind::kRemove:
+      return "nobody may remove the own account";
+    default:
+      return nullptr;
+  }
 }
 
 }  // namespace
+
+AccountApi::AccountApi(Access& access)
+    : access_(access),
+      changes_({TokenBucket({kMaxChanges, kMaxChanges * kSecondsPerChange})},
+               accounts::AccountStore::kMaxAccounts, KeyedTokenBuckets<1>::Eviction::kAlways) {}
 
 bool AccountApi::IsAddress(std::string_view path) {
   return path.substr(0, kAccountAddress.size()) == kAccountAddress &&
@@ -54,9 +74,9 @@ HttpResponse AccountApi::Answer(const RequestTarget& target, const HttpRequest& 
     answer = is_read ? List(target) : AccountMethodNotAllowed("GET, HEAD");
   } else if (below == kAccountEvents) {
     answer = is_read ? Events(target) : AccountMethodNotAllowed("GET, HEAD");
-  } else if (ActionOf(below)) {
+  } else if (const auto action = ActionOf(below)) {
     RefuseQueryParameters(target);
-    answer = question.method == "POST" ? Change(below, admin, question)
+    answer = question.method == "POST" ? Change(*action, admin, question)
                                        : AccountMethodNotAllowed("POST");
   } else {
     answer = MakeErrorAnswer(404, "there is nothing at this address");
@@ -96,6 +116,7 @@ HttpResponse AccountApi::Events(const RequestTarget& target) const {
                                 {"name", event.name},
                                 {"by", event.by},
                                 {"client", event.client},
+                                {"role", event.role ? Json(RoleName(*event.role)) : Json()},
                                 {"time", Rfc3339(event.at_ns)}});
   }
   // As many as were asked for: there may be more.
@@ -103,25 +124,61 @@ HttpResponse AccountApi::Events(const RequestTarget& target) const {
   return JsonAnswer(answer);
 }
 
-HttpResponse AccountApi::Change(std::string_view what, const std::string& admin,
+bool AccountApi::MayChange(const std::string& admin) {
+  const MutexLock lock(mutex_);
+  return changes_.Use(admin, SteadyNs())->front().Take(1);
+}
+
+HttpResponse AccountApi::Change(AccountEventKind action, const std::string& admin,
                                 const HttpRequest& question) {
   if (!IsJsonType(question.content_type)) return WrongBodyType();
-  const auto name = ParseAccountName(question.body);
-  if (!name) return MakeErrorAnswer(400, "the body is not accepted, accepted is the text name");
+  const AccountBody body = ParseAccountBody(action, question.body);
+  const char* const refusal = body.name == admin ? WhyNotOnOwnAccount(action) : nullptr;
+  if (refusal != nullptr) return MakeErrorAnswer(409, refusal);
+  const bool is_there = access_.accounts()->Has(body.name);
+  const bool is_new = action == AccountEventKind::kAdd;
+  if (!is_there && !is_new) return MakeErrorAnswer(404, "there is no account of this name");
+  if (is_there && is_new) return MakeErrorAnswer(409, "there is an account of this name already");
+  if (!MayChange(admin)) return TooMany("too many accounts were changed, try again in a minute");
+  const bool hashes = is_new || action == AccountEventKind::kSetPassword;
+  const auto change = [&] { return ChangeNow(action, admin, body, question); };
+  try {
+    return hashes ? access_.HashInTurn(change) : change();
+  } catch (const StoreError&) {
+    throw;
+  } catch (const Error& error) {
+    throw BadRequest(error.what());
+  }
+}
+
+HttpResponse AccountApi::ChangeNow(AccountEventKind action, const std::string& admin,
+                                   const AccountBody& body, const HttpRequest& question) {
   accounts::AccountStore& store = *access_.accounts();
-  if (!store.Has(*name)) return MakeErrorAnswer(404, "there is no account of this name");
-  const accounts::AccountEventKind kind = *ActionOf(what);
-  if (kind == accounts::AccountEventKind::kLock && *name == admin) {
-    return MakeErrorAnswer(409, "nobody may lock the own account");
+  const std::int64_t now_ns = SystemNs();
+  Json answer{{"name", body.name}};
+  switch (action) {
+    case AccountEventKind::kAdd:
+      store.Add(body.name, *body.role, body.password, now_ns);
+      answer["role"] = RoleName(*body.role);
+      break;
+    case AccountEventKind::kRole:
+      store.SetRole(body.name, *body.role);
+      answer["role"] = RoleName(*body.role);
+      break;
+    case AccountEventKind::kSetPassword:
+      store.SetPassword(body.name, body.password, now_ns);
+      break;
+    case AccountEventKind::kRemove:
+      store.Remove(body.name);
+      break;
+    case AccountEventKind::kEndSessions:
+      answer["ended"] = store.EndSessions(body.name);
+      break;
+    default:
+      answer["locked"] = action == AccountEventKind::kLock;
+      store.SetLocked(body.name, action == AccountEventKind::kLock);
   }
-  Json answer{{"name", *name}};
-  if (kind == accounts::AccountEventKind::kEndSessions) {
-    answer["ended"] = store.EndSessions(*name);
-  } else {
-    store.SetLocked(*name, kind == accounts::AccountEventKind::kLock);
-    answer["locked"] = kind == accounts::AccountEventKind::kLock;
-  }
-  store.Note({0, kind, *name, admin, question.client, SystemNs()});
+  store.Note({0, action, body.name, admin, question.client, now_ns, body.role});
   return JsonAnswer(answer);
 }
 

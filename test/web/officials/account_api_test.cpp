@@ -5,6 +5,8 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "accounts/account_store.h"
 #include "common/clock.h"
@@ -57,8 +59,10 @@ class AccountApiTest : public testing::Test {
     return {cookie.substr(0, cookie.find(';')), answer.Json().value("csrf_token", "")};
   }
   HttpResult Do(const std::string& what, const std::string& name, const Headers& headers) {
-    return Request(port(), "POST", "/api/v1/accounts/" + what, headers,
-                   nlohmann::json{{"name", name}}.dump());
+    return Change(what, {{"name", name}}, headers);
+  }
+  HttpResult Change(const std::string& what, const nlohmann::json& body, const Headers& headers) {
+    return Request(port(), "POST", "/api/v1/accounts/" + what, headers, body.dump());
   }
   bool IsLoggedIn(const LoggedIn& somebody) {
     return !Get(port(), "/api/v1/session", somebody.ToRead()).Json()["name"].is_null();
@@ -82,9 +86,14 @@ TEST_F(AccountApiTest, OnlyAnAdminWhoHasLoggedInSeesAndChangesAccounts) {
   }
   EXPECT_EQ(Do("lock", "jones", official.ToChange()).status, 403);
   EXPECT_EQ(Do("lock", "jones", token).status, 401);
+  for (const char* what : {"add", "role", "password", "remove", "end_sessions"}) {
+    EXPECT_EQ(Do(what, "jones", official.ToChange()).status, 403) << what;
+    EXPECT_EQ(Do(what, "jones", token).status, 401) << what;
+  }
   LoggedIn forged = LogIn("root");
   forged.csrf_token[0] = forged.csrf_token[0] == '0' ? '1' : '0';
   EXPECT_EQ(Do("lock", "jones", forged.ToChange()).status, 403);
+  EXPECT_EQ(Do("remove", "jones", forged.ToChange()).status, 403);
   EXPECT_EQ(TryLogIn("jones").status, 200) << "nothing was locked";
 }
 
@@ -128,6 +137,66 @@ TEST_F(AccountApiTest, EndsSessionsWithoutALock) {
   EXPECT_EQ(TryLogIn("miller").status, 200);
 }
 
+TEST_F(AccountApiTest, AnAddedAccountLogsInAndCanBeRemovedAgain) {
+  const LoggedIn admin = LogIn("root");
+  const nlohmann::json anna{{"name", "anna"}, {"role", "viewer"}, {"password", kSamePassword}};
+  EXPECT_EQ(Change("add", anna, admin.ToChange()).status, 200);
+  const LoggedIn viewer = LogIn("anna");
+  EXPECT_TRUE(IsLoggedIn(viewer));
+  EXPECT_EQ(Change("add", anna, admin.ToChange()).status, 409) << "there already";
+  EXPECT_EQ(Do("remove", "anna", admin.ToChange()).status, 200);
+  EXPECT_FALSE(IsLoggedIn(viewer));
+  EXPECT_EQ(TryLogIn("anna").status, 401);
+  EXPECT_EQ(Do("remove", "anna", admin.ToChange()).status, 404);
+}
+
+TEST_F(AccountApiTest, ARoleHoldsAtOnce) {
+  const LoggedIn admin = LogIn("root");
+  const LoggedIn official = LogIn("miller");
+  EXPECT_EQ(Change("role", {{"name", "miller"}, {"role", "admin"}}, admin.ToChange()).status, 200);
+  EXPECT_EQ(Get(port(), "/api/v1/accounts", official.ToRead()).status, 200);
+  EXPECT_EQ(Change("role", {{"name", "miller"}, {"role", "viewer"}}, admin.ToChange()).status, 200);
+  EXPECT_EQ(Get(port(), "/api/v1/accounts", official.ToRead()).status, 403);
+}
+
+TEST_F(AccountApiTest, ANewPasswordEndsSessionsAndTheOldOneIsWrong) {
+  const LoggedIn admin = LogIn("root");
+  const LoggedIn official = LogIn("miller");
+  const nlohmann::json body{{"name", "miller"}, {"password", "staple battery horse"}};
+  EXPECT_EQ(Change("password", body, admin.ToChange()).status, 200);
+  EXPECT_FALSE(IsLoggedIn(official));
+  EXPECT_EQ(TryLogIn("miller").status, 401);
+  EXPECT_EQ(TryLogIn("miller", "staple battery horse").status, 200);
+}
+
+TEST_F(AccountApiTest, NamesAndPasswordsThatTheStoreRefusesAreSaid) {
+  const LoggedIn admin = LogIn("root");
+  const HttpResult blank =
+      Change("add", {{"name", " anna"}, {"role", "viewer"}, {"password", kSamePassword}},
+             admin.ToChange());
+  EXPECT_EQ(blank.status, 400);
+  EXPECT_THAT(blank.body, HasSubstr("the name is not accepted"));
+  const HttpResult quick =
+      Change("password", {{"name", "miller"}, {"password", "short"}}, admin.ToChange());
+  EXPECT_EQ(quick.status, 400);
+  EXPECT_THAT(quick.body, HasSubstr("accepted are 12 to 256 bytes"));
+  EXPECT_EQ(TryLogIn("miller").status, 200) << "nothing was changed";
+}
+
+TEST_F(AccountApiTest, OneAdminChangesAccountsOnlySoFast) {
+  const LoggedIn admin = LogIn("root");
+  int done = 0;
+  HttpResult answer;
+  for (int i = 0; i < 2 * AccountApi::kMaxChanges; ++i) {
+    answer = Do("end_sessions", "jones", admin.ToChange());
+    if (answer.status != 200) break;
+    ++done;
+  }
+  EXPECT_GE(done, AccountApi::kMaxChanges);
+  EXPECT_EQ(answer.status, 429);
+  EXPECT_EQ(answer.Field("Retry-After"), "60");
+}
+
 TEST_F(AccountApiTest, TheTrailSaysWhoLoggedInWhoFailedAndWhatAdminsDid) {
   TryLogIn("miller", "a wrong password");
   TryLogIn("my secret passphrase", "miller");
@@ -156,10 +225,34 @@ TEST_F(AccountApiTest, TheTrailSaysWhoLoggedInWhoFailedAndWhatAdminsDid) {
   EXPECT_EQ(page.Json()["next"], 2);
 }
 
+TEST_F(AccountApiTest, TheTrailSaysWhatBecameOfAccounts) {
+  const LoggedIn admin = LogIn("root");
+  Change("add", {{"name", "anna"}, {"role", "viewer"}, {"password", kSamePassword}},
+         admin.ToChange());
+  Change("role", {{"name", "anna"}, {"role", "official"}}, admin.ToChange());
+  Change("password", {{"name", "anna"}, {"password", "staple battery horse"}}, admin.ToChange());
+  Do("remove", "anna", admin.ToChange());
+  const HttpResult answer = Get(port(), "/api/v1/accounts/events?limit=4", admin.ToRead());
+  const auto events = answer.Json()["events"];
+  ASSERT_EQ(events.size(), 4U) << answer.body;
+  const std::vector<std::pair<std::string, std::string>> expected{
+      {"remove", ""}, {"set_password", ""}, {"role", "official"}, {"add", "viewer"}};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(events[i]["event"], expected[i].first);
+    EXPECT_EQ(events[i]["name"], "anna");
+    EXPECT_EQ(events[i]["by"], "root");
+    EXPECT_EQ(events[i]["role"].is_null() ? "" : events[i]["role"].get<std::string>(),
+              expected[i].second);
+  }
+  EXPECT_THAT(answer.body, Not(HasSubstr("staple")));
+}
+
 TEST_F(AccountApiTest, RefusesWhatItDoesNotKnow) {
   const LoggedIn admin = LogIn("root");
   EXPECT_EQ(Do("lock", "nobody", admin.ToChange()).status, 404);
   EXPECT_EQ(Do("lock", "root", admin.ToChange()).status, 409) << "the own account";
+  EXPECT_EQ(Do("remove", "root", admin.ToChange()).status, 409) << "the own account";
+  EXPECT_EQ(Change("role", {{"name", "root"}, {"role", "viewer"}}, admin.ToChange()).status, 409);
   EXPECT_EQ(Do("explode", "jones", admin.ToChange()).status, 404);
   EXPECT_EQ(Get(port(), "/api/v1/accounts/lock", admin.ToRead()).status, 405);
   EXPECT_EQ(Do("", "jones", admin.ToChange()).status, 404);
