@@ -90,9 +90,13 @@ class Page {
     });
     this.history = new HazardHistory((id) => this.layer.redraw(id),
       (hazard, id) => this.officials.askUndo(hazard, id));
-    this.frames = new FrameRequests((text, hazard, id) => {
-      this.officials.sayDoneAtDesk(text, hazard, id);
-      this.history.renew(hazard);
+    this.frames = new FrameRequests({
+      onDone: (text, hazard, id) => {
+        this.officials.sayDoneAtDesk(text, hazard, id);
+        this.history.renew(hazard);
+      },
+      openId: () => this.layer.popup?.id ?? null,
+      onChange: (id) => this.layer.redraw(id, false),
     });
     this.work = new WorkDialog(map, this.catalogue, {
       onDone: (text, hazard, id) => {

@@ -18,56 +18,50 @@ function clock(time) {
 }
 
 export class FrameRequests {
-  /** `onDone(text, hazard, decisionId)` says what was done. */
-  constructor(onDone) {
+  /** `onDone(text, hazard, decisionId)` says what was done, `openId()` is the hazard whose popup is
+   * open, and `onChange(id)` draws it anew. */
+  constructor({ onDone, openId, onChange }) {
     this.onDone = onDone;
-    /** What the zone told last, by hazard, so that a popup that is drawn anew does not jump. */
-    this.told = { id: null, frame: null };
+    this.openId = openId;
+    this.onChange = onChange;
+    /** What the zone told last, of one hazard; null while it comes. */
+    this.id = null;
+    this.frame = null;
+    this.wrong = '';
+    // A request runs out without an event of its hazard.
+    if (session.decides()) setInterval(() => this.lookAgain(), LOOK_MS);
   }
 
   /** The part of a hazard's popup; nothing for those who do not decide. */
   section(hazard) {
     if (!session.decides() || hazard.state === REJECTED.name) return [];
-    const node = element('div', { class: 'frame-request' });
-    this.draw(node, hazard, this.told.id === hazard.id ? this.told.frame : null);
-    this.look(node, hazard);
-    return [node];
-  }
-
-  async look(node, hazard) {
-    for (;;) {
-      let frame = null;
-      try {
-        frame = await getJson(`/api/v1/hazards/${hazard.id}/frame`);
-      } catch (failure) {
-        // Asked again in a while.
-      }
-      if (frame !== null) this.keep(node, hazard, frame);
-      if (frame !== null && frame.state !== 'waiting') return;
-      await new Promise((resolve) => { setTimeout(resolve, LOOK_MS); });
-      if (!node.isConnected) return;
-    }
-  }
-
-  keep(node, hazard, frame) {
-    const isNew = this.told.id !== hazard.id || JSON.stringify(this.told.frame) !== JSON.stringify(frame);
-    this.told = { id: hazard.id, frame };
-    if (isNew) this.draw(node, hazard, frame);
-  }
-
-  draw(node, hazard, frame) {
-    const isWaiting = frame?.state === 'waiting';
+    if (this.id !== hazard.id) Object.assign(this, { id: hazard.id, frame: null, wrong: '' });
+    this.look(hazard.id);
     const ask = element('button', { type: 'button', class: 'quiet', 'data-focus': 'frame' },
       'Ask the next vehicle for the whole frame');
-    ask.onclick = () => this.ask(node, hazard, ask);
-    const hadFocus = node.contains(document.activeElement);
-    node.replaceChildren(element('p', { class: 'frame-state', role: 'status' }, ...this.words(hazard, frame)),
-      ...(isWaiting ? [] : [ask]));
-    if (hadFocus) (node.querySelector('button, a') ?? node.closest('.popup'))?.focus();
+    ask.onclick = ({ currentTarget }) => this.ask(hazard, currentTarget);
+    const words = this.wrong === '' ? this.words(hazard) : [this.wrong];
+    return [element('div', { class: 'frame-request' },
+      element('p', { class: 'frame-state', role: 'status' }, ...words),
+      ...(this.frame?.state === 'waiting' ? [] : [ask]))];
+  }
+
+  lookAgain() {
+    const isSettled = this.frame !== null && this.frame.state !== 'waiting';
+    if (!document.hidden && this.id !== null && this.id === this.openId() && !isSettled) this.look(this.id);
+  }
+
+  async look(id) {
+    const frame = await getJson(`/api/v1/hazards/${id}/frame`).catch(() => null);
+    if (frame === null || this.id !== id || JSON.stringify(this.frame) === JSON.stringify(frame)) return;
+    this.frame = frame;
+    this.wrong = '';
+    this.onChange(id);
   }
 
   /** How the newest request stands. */
-  words(hazard, frame) {
+  words(hazard) {
+    const { frame } = this;
     if (frame === null || frame.state === 'none') return [];
     const asked = ['Whole frame asked for ', clock(frame.asked), ` by ${frame.official}`];
     const url = pictureAddress(frame.picture?.image);
@@ -81,15 +75,16 @@ export class FrameRequests {
     return [...asked, ...(outcomes[frame.state] ?? [])];
   }
 
-  async ask(node, hazard, button) {
+  async ask(hazard, button) {
     button.disabled = true;
     const { told, wrong } = await actOn(hazard, 'frame', {});
+    button.disabled = false;
     if (wrong) {
-      button.disabled = false;
-      node.querySelector('.frame-state').textContent = wrong.sentence;
+      this.wrong = wrong.sentence;
+      this.onChange(hazard.id);
       return;
     }
     this.onDone('Whole frame asked for', hazard, told.properties?.decision_id);
-    this.look(node, hazard);
+    this.look(hazard.id);
   }
 }
