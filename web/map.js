@@ -9,6 +9,7 @@ import { AttributionText, FitControl } from './layers/controls.js';
 import { byId, nextTask, throttled } from './dom.js';
 import { plural } from './format.js';
 import { Graticule } from './layers/graticule.js';
+import { AccountsView } from './desk/accounts_view.js';
 import { AreaFilter } from './desk/area_filter.js';
 import { AssignmentList } from './desk/assignment_list.js';
 import { csvOf, geoJsonOf, saveFile } from './desk/export.js';
@@ -117,6 +118,7 @@ class Page {
     this.trail = new DecisionList((hazard, id) => this.officials.askUndo(hazard, id));
     this.review = new ReviewQueue((hazard) => this.choose(hazard), () => this.trail.refresh());
     this.statistics = new StatisticsView();
+    this.accounts = new AccountsView();
     this.inView = byId('in-view');
     this.list = new HazardList(data, this.catalogue, (hazard) => this.choose(hazard),
       () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));

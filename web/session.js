@@ -4,6 +4,7 @@
 import { addressOf } from './address.js';
 import { byId } from './dom.js';
 
+const ADDRESS = '/api/v1/session';
 const DECIDES = ['official', 'admin'];
 
 export const session = {
@@ -17,9 +18,9 @@ export const session = {
 };
 
 /** Sends a request by the session: {status, told}. Status 0: the zone does not answer. */
-async function send(method, body) {
+export async function send(method, path, body = undefined) {
   try {
-    const answer = await fetch(addressOf('/api/v1/session'), {
+    const answer = await fetch(addressOf(path), {
       method, cache: 'no-store', credentials: 'same-origin',
       headers: { 'X-CSRF-Token': session.csrfToken, 'Content-Type': 'application/json' },
       body: body === undefined ? undefined : JSON.stringify(body),
@@ -30,7 +31,8 @@ async function send(method, body) {
   }
 }
 
-function sentenceFor({ status, told }) {
+/** Why a request by the session was not done, from what send answers. */
+export function sentenceFor({ status, told }) {
   if (status === 0) return 'The zone does not answer. Try again in a moment.';
   const error = told.error ?? `the zone answered ${status}`;
   return `${error.charAt(0).toUpperCase()}${error.slice(1)}.`;
@@ -40,7 +42,7 @@ async function logIn() {
   const [name, password] = [byId('log-in-name'), byId('log-in-password')];
   const [error, submit] = [byId('log-in-error'), byId('log-in-submit')];
   submit.disabled = true;
-  const answer = await send('POST', { name: name.value.trim(), password: password.value });
+  const answer = await send('POST', ADDRESS, { name: name.value.trim(), password: password.value });
   submit.disabled = false;
   if (answer.status === 200) {
     // All that is on the screen is of what one saw before.
@@ -61,7 +63,7 @@ export function askToLogIn(why = '') {
 }
 
 async function logOut() {
-  await send('DELETE');
+  await send('DELETE', ADDRESS);
   window.location.reload();
 }
 
