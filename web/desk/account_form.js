@@ -3,7 +3,7 @@
 import { byId, element } from '../dom.js';
 import { send, sentenceFor, session } from '../session.js';
 
-const ROLES = [['viewer', 'Viewer: sees vehicles and unconfirmed hazards'],
+const ROLES = [['viewer', 'Viewer: sees vehicles'],
   ['official', 'Official: also decides'], ['admin', 'Admin: also manages accounts']];
 
 /** What is asked for, by what is done. `done` follows the account's name. */

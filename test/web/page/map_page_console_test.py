@@ -12,7 +12,7 @@ import json
 import sys
 
 import map_page_log_in_test as log_in_test
-from map_page_fixture import HOSTILE, LAT, LON, Keys, run_tests
+from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, Keys, run_tests
 from map_page_officials_test import OfficialsPage
 
 # What a click on a link with `download` would save.
@@ -25,13 +25,14 @@ CATCH_FILES = """
 class ConsolePage(OfficialsPage):
     """What the tests of the console share."""
 
-    open_accounts = log_in_test.LogIn.open_accounts
     log_in, wait_logged_in = log_in_test.LogIn.log_in, log_in_test.LogIn.wait_logged_in
 
     def open_as(self, name):
+        """As somebody who has logged in; how one does is for map_page_log_in_test."""
         self.open_accounts()
+        cookie = self.zone.do("session", name=name)
+        self.browser.execute_cdp_cmd("Network.setCookie", {**cookie, "url": self.zone.url, "httpOnly": True})
         self.open()
-        self.log_in(name)
         self.wait_logged_in(name)
 
     def start_work(self, hazard, task):
@@ -52,7 +53,9 @@ class ConsolePage(OfficialsPage):
         self.wait_for(".history-list li")
 
     def look(self, name):
-        """A picture on a desktop and on a phone, light and dark."""
+        """A picture on a desktop and on a phone, light and dark; nothing where none are taken."""
+        if not OPTIONS.screenshots:
+            return
         for dark in (False, True):
             self.emulate_scheme(dark)
             for size, width, height in (("desktop", 1280, 800), ("phone", 390, 844)):
@@ -210,13 +213,17 @@ class Console(ConsolePage):
         self.wait_for_text("#trail", "Asked for a whole frame of a hazard", "miller")
         self.assert_quiet()
 
-    def test_a_request_for_a_frame_is_taken_back(self):
+    def test_a_request_for_a_frame_is_taken_back_or_runs_out(self):
         hazard = self.zone.report("pothole", LAT, LON)
         self.open_as("miller")
         self.ask_for_frame(hazard)
         self.click("#notice-undo")
         self.wait_for_text(".frame-state", "taken back")
         self.assertEqual(self.pass_by("yes"), 0, "nobody is asked any more")
+        self.ask_for_frame(hazard)
+        # The hazard itself stays as it is: nothing but the time tells the page.
+        self.zone.do("pass", seconds=4 * 3600 + 60)
+        self.wait_for_text(".frame-state", "no vehicle brought one in time")
         self.assert_quiet()
 
     def test_pictures_are_looked_at_closer_and_one_after_the_other(self):

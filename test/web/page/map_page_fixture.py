@@ -118,6 +118,7 @@ class MapPage(unittest.TestCase):
     size = (1280, 800)
     dark = False
     server_arguments = ()
+    accounts_folder = None  # Of all classes together.
 
     @classmethod
     def setUpClass(cls):
@@ -128,7 +129,19 @@ class MapPage(unittest.TestCase):
         self.zone = ZoneProcess(*self.server_arguments)
         self.addCleanup(self.zone.close)
         self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
+        self.browser.execute_cdp_cmd("Network.clearBrowserCookies", {})
         self.browser.get_log("browser")
+
+    def open_accounts(self, public="all"):
+        """From now on jones, miller and root may log in. Passwords are slow to hash, so that nobody guesses them:
+        every test has a copy of the same file."""
+        if MapPage.accounts_folder is None:
+            MapPage.accounts_folder = tempfile.TemporaryDirectory(prefix="livemap_accounts_")
+            self.zone.do("accounts", public=public, file=os.path.join(MapPage.accounts_folder.name, "first.sqlite"))
+            self.zone.do("stop")  # The file is whole.
+        own = os.path.join(MapPage.accounts_folder.name, f"{self.id()}.sqlite")
+        shutil.copy(os.path.join(MapPage.accounts_folder.name, "first.sqlite"), own)
+        self.password = self.zone.do("accounts", public=public, file=own)["password"]
 
     def open(self):
         self.browser.get(self.zone.url)
@@ -140,7 +153,7 @@ class MapPage(unittest.TestCase):
         moving = (NoSuchElementException, StaleElementReferenceException,
                   ElementClickInterceptedException, ElementNotInteractableException)
         try:
-            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.02,
+            return WebDriverWait(self.browser, HANG_S, poll_frequency=0.05,
                                  ignored_exceptions=moving).until(lambda _: condition())
         except TimeoutException:
             log = [entry["message"] for entry in self.browser.get_log("browser")]

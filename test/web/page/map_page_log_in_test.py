@@ -13,9 +13,6 @@ from map_page_officials_test import OfficialsPage
 
 
 class LogIn(OfficialsPage):
-    def open_accounts(self, public="all"):
-        self.password = self.zone.do("accounts", public=public)["password"]
-
     def log_in(self, name, password=None):
         self.wait(lambda: self.find("#session").is_displayed(), "nobody can log in")
         if not self.find("#log-in").is_displayed():
@@ -202,7 +199,7 @@ class LogIn(OfficialsPage):
 
 class Phone(OfficialsPage):
     size = (390, 844)
-    open_accounts, log_in, wait_logged_in = LogIn.open_accounts, LogIn.log_in, LogIn.wait_logged_in
+    log_in, wait_logged_in = LogIn.log_in, LogIn.wait_logged_in
 
     def test_the_log_in_fits(self):
         self.open_accounts()

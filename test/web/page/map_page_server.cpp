@@ -13,8 +13,12 @@
 //   {"do": "reject", "id": UUID}            as an official              -> {"rejected"}
 //   {"do": "pass", "seconds": S}            the zone's clock goes on    -> {"passed"}
 //   {"do": "close_decisions"}               the server starts anew without a token file
-//   {"do": "accounts", "public": "all"}     the server starts anew with the accounts jones (viewer)
-//                                           and miller (official)       -> {"password"}
+//   {"do": "accounts", "public": "all", "file": F}   the server starts anew with the accounts of
+//                                           F, which gets jones (viewer), miller (official) and
+//                                           root (admin) where it has none; without F those of a
+//                                           new file                    -> {"password"}
+//   {"do": "session", "name": NAME}         logs in without a password  -> {"name", "value"} of
+//                                           the cookie
 //   {"do": "orders", "recipients": [{"name": N, "kind": "webhook", "url": URL, "delay_s": S,
 //    "classes": [C]}]}                      the server starts anew with work orders; what fails
 //    once
@@ -120,6 +124,7 @@ class Session {
     if (verb == "pass") return Pass(command);
     if (verb == "close_decisions") return CloseDecisions();
     if (verb == "accounts") return OpenAccounts(command);
+    if (verb == "session") return OpenSession(command);
     if (verb == "orders") return OpenOrders(command);
     if (verb == "log_out_all") return SetPasswords();
     if (verb == "fill") return Fill(command);
@@ -157,7 +162,7 @@ class Session {
     return Start();
   }
 
-  /// Each call with accounts of its own.
+  /// A file that has accounts saves the time of hashing their passwords.
   Json OpenAccounts(const Json& command) {
     const std::map<std::string, livemap::web::PublicSees> choices{
         {"nothing", livemap::web::PublicSees::kNothing},
@@ -165,13 +170,22 @@ class Session {
         {"all", livemap::web::PublicSees::kAll}};
     server_.reset();
     options_.public_sees = choices.at(command.at("public"));
-    options_.accounts_file =
-        accounts_folder_.path() + "/" + std::to_string(++account_files_) + ".sqlite";
+    options_.accounts_file = command.value(
+        "file", accounts_folder_.path() + "/" + std::to_string(++account_files_) + ".sqlite");
     livemap::accounts::AccountStore accounts(options_.accounts_file, {});
-    accounts.Add("jones", livemap::accounts::Role::kViewer, kPassword, livemap::SystemNs());
-    accounts.Add("miller", livemap::accounts::Role::kOfficial, kPassword, livemap::SystemNs());
+    if (!accounts.HasAccounts()) {
+      accounts.Add("jones", livemap::accounts::Role::kViewer, kPassword, livemap::SystemNs());
+      accounts.Add("miller", livemap::accounts::Role::kOfficial, kPassword, livemap::SystemNs());
+      accounts.Add("root", livemap::accounts::Role::kAdmin, kPassword, livemap::SystemNs());
+    }
     Start();
     return {{"password", kPassword}};
+  }
+
+  Json OpenSession(const Json& command) {
+    livemap::accounts::AccountStore accounts(options_.accounts_file, {});
+    return {{"name", "livemap_" + accounts.id()},
+            {"value", accounts.OpenSession(command.at("name"), livemap::SystemNs())}};
   }
 
   Json OpenOrders(const Json& command) {

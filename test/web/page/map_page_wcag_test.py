@@ -15,6 +15,7 @@ import sys
 import tarfile
 import unittest
 
+from map_page_accounts_test import AccountsPage
 from map_page_fixture import LAT, LON, Keys, run_tests
 from map_page_orders_test import OrdersPage
 
@@ -51,7 +52,7 @@ def axe_source():
         return files.extractfile("package/axe.min.js").read().decode()
 
 
-class Rules(OrdersPage):
+class Rules(OrdersPage, AccountsPage):
     @classmethod
     def setUpClass(cls):
         cls.axe = axe_source()
@@ -125,6 +126,23 @@ class Rules(OrdersPage):
         self.open_popup_of(pothole)
         self.wait_for_text(".popup", "Roads north", "Open at the recipient")
         self.assert_keeps_the_rules("a hazard with its team and orders")
+        self.assert_quiet()
+
+
+    def test_the_accounts_keep_the_rules(self):
+        self.open_as("root")
+        self.open_list()
+        self.wait_for_account("miller")
+        self.press_in("miller", "lock")
+        self.wait_for_account("miller", "locked")
+        self.click("#accounts-log summary")
+        self.wait_for_text("#accounts-trail", "miller: locked")
+        self.assert_keeps_the_rules("the accounts")
+        self.click("#accounts-add")
+        self.assert_keeps_the_rules("a new account")
+        self.press(Keys.ESCAPE)
+        self.press_in("miller", "remove")
+        self.assert_keeps_the_rules("a removal")
         self.assert_quiet()
 
 
