@@ -27,8 +27,8 @@ def at(east_m, north_m):
     return LAT + north_m / 111132, LON + east_m / (111320 * math.cos(math.radians(LAT)))
 
 
-def write_town(path):
-    """A lattice of streets, one of them of two carriageways, one with a script for a name; a motorway passes by."""
+def write_town(path, odd_name=SCRIPT):
+    """A lattice of streets, one of them of two carriageways, one with an odd name; a motorway passes by."""
     nodes, ways, half = [], [], BLOCKS * BLOCK_M / 2
 
     def node(east_m, north_m):
@@ -44,7 +44,7 @@ def write_town(path):
     grid = {(i, k): node(i * BLOCK_M - half, k * BLOCK_M - half)
             for i in range(BLOCKS + 1) for k in range(BLOCKS + 1)}
     for k in range(BLOCKS + 1):
-        name = SCRIPT if k == 5 else f"{k + 1}th Street"
+        name = odd_name if k == 5 else f"{k + 1}th Street"
         kind = "primary" if k == 4 else "residential"
         # Mappers cut streets into short ways.
         for i in range(BLOCKS):
