@@ -33,9 +33,13 @@ HANG_S = 40  # Bounds a hang; no test measures speed by it.
 class ZoneProcess:
     """The C++ server; `do` sends one command and returns its answer."""
 
-    def __init__(self, *arguments):
-        self.process = subprocess.Popen([OPTIONS.server, *arguments], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True)
+    @staticmethod
+    def launch(*arguments):
+        """A process that is still starting, for later."""
+        return subprocess.Popen([OPTIONS.server, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def __init__(self, *arguments, process=None):
+        self.process = process or self.launch(*arguments)
         started = self.read()
         self.port, self.token = started["port"], started["token"]
         self.url = f"http://127.0.0.1:{self.port}/"
@@ -122,11 +126,19 @@ class MapPage(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        cls.launch_next()
+        cls.addClassCleanup(lambda: ZoneProcess(process=cls.next_process).close())
         cls.browser = start_browser(*cls.size, dark=cls.dark)
         cls.addClassCleanup(stop_browser, cls.browser)
 
+    @classmethod
+    def launch_next(cls):
+        """The zone of the test to come starts while this one waits for the page."""
+        cls.next_process = ZoneProcess.launch(*cls.server_arguments)
+
     def setUp(self):
-        self.zone = ZoneProcess(*self.server_arguments)
+        self.zone = ZoneProcess(process=self.next_process)
+        self.launch_next()
         self.addCleanup(self.zone.close)
         self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
         self.browser.execute_cdp_cmd("Network.clearBrowserCookies", {})

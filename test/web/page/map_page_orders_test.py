@@ -29,8 +29,10 @@ class RecipientProcess:
         self.process = subprocess.Popen(
             [sys.executable, RECIPIENTS, kind, str(self.port), pathlib.Path(folder) / kind],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        assert self.process.stdout.readline() == "ready\n", f"the {kind} recipient does not start"
         self.url = f"http://127.0.0.1:{self.port}/" + {"webhook": "hook", "open311": "v2"}[kind]
+
+    def wait_ready(self):
+        assert self.process.stdout.readline() == "ready\n", f"the recipient at {self.url} does not start"
 
     def be(self, mode):
         self.process.stdin.write(mode + "\n")
@@ -47,13 +49,16 @@ class OrdersPage(ConsolePage):
     """A zone that sends potholes to the city's Open311 server and everything to the works office."""
 
     def setUp(self):
-        super().setUp()
         folder = tempfile.TemporaryDirectory(prefix="livemap_orders_")
         self.addCleanup(folder.cleanup)
         self.office = RecipientProcess("webhook", folder.name)
         self.addCleanup(self.office.close)
         self.city = RecipientProcess("open311", folder.name)
         self.addCleanup(self.city.close)
+        # All of them start at once.
+        super().setUp()
+        self.office.wait_ready()
+        self.city.wait_ready()
         self.zone.do("orders", recipients=[
             {"name": "works-office", "kind": "webhook", "url": self.office.url},
             {"name": "city-311", "kind": "open311", "url": self.city.url, "classes": ["pothole"]},
