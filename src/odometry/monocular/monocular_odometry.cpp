@@ -131,40 +131,47 @@ void MonocularOdometry::ForgetOldSource() {
   if (Seconds(now_ns_ - told_ns_) > age_s) source_ = MetresSource::kNone;
 }
 
-/// The way since the last frame, by the mean of the speeds at its ends.
-void MonocularOdometry::AddWay(const MonocularFrame& frame) {
-  if (!last_frame_) return;
-  if (!last_frame_->speed_mps || !frame.speed_mps) {
-    way_has_gap_ = true;
+/// The way between two frames, by the mean of the speeds at its ends.
+void MonocularOdometry::Way::Add(const MonocularFrame& from, const MonocularFrame& to,
+                                 double default_sigma_mps) {
+  if (!from.speed_mps || !to.speed_mps) {
+    has_gap = true;
     return;
   }
-  const double step_s = Seconds(frame.stamp_ns - last_frame_->stamp_ns);
-  way_m_ += 0.5 * (*last_frame_->speed_mps + *frame.speed_mps) * step_s;
-  way_s_ += step_s;
+  const double step_s = Seconds(to.stamp_ns - from.stamp_ns);
+  m += 0.5 * (*from.speed_mps + *to.speed_mps) * step_s;
+  s += step_s;
   // Speeds of neighbouring frames err alike.
-  way_sigma_m_ += frame.speed_sigma_mps.value_or(config_.speed_sigma_mps) * step_s;
+  sigma_m += to.speed_sigma_mps.value_or(default_sigma_mps) * step_s;
+}
+
+/// Where some of the images came without a speed the vehicle went on as at the others.
+void MonocularOdometry::Way::FillGap(double elapsed_s) {
+  const double gap_s = elapsed_s - s;
+  if (!has_gap || gap_s <= 0 || s < kLeastShareOfStart * elapsed_s) return;
+  m *= elapsed_s / s;
+  sigma_m += kGapSigmaMps * gap_s;
+  has_gap = false;
+}
+
+void MonocularOdometry::AddWay(const MonocularFrame& frame) {
+  if (!last_frame_) return;
+  way_.Add(*last_frame_, frame, config_.speed_sigma_mps);
+  start_way_.Add(*last_frame_, frame, config_.speed_sigma_mps);
 }
 
 void MonocularOdometry::BeginStart(const MonocularFrame& frame) {
   started_ = false;
   start_images_.Build(frame.grey);
   start_.Begin(start_images_[0]);
-  start_stamp_ns_ = frame.stamp_ns;
+  start_stamp_ns_ = first_stamp_ns_ = frame.stamp_ns;
+  start_way_ = {};
   ForgetWay();
 }
 
 void MonocularOdometry::ForgetWay() {
-  way_m_ = way_s_ = way_sigma_m_ = way_units_ = 0;
-  way_has_gap_ = false;
-}
-
-/// Where the start's first images came without a speed the vehicle went on as later.
-void MonocularOdometry::FillGapOfStart(double elapsed_s) {
-  const double gap_s = elapsed_s - way_s_;
-  if (!way_has_gap_ || gap_s <= 0 || way_s_ < kLeastShareOfStart * elapsed_s) return;
-  way_m_ *= elapsed_s / way_s_;
-  way_sigma_m_ += kGapSigmaMps * gap_s;
-  way_has_gap_ = false;
+  way_ = {};
+  way_units_ = 0;
 }
 
 /// The last pose once more, less certain if it is lost.
@@ -194,55 +201,145 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
     if (start_.HasJustBegun()) BeginStart(frame);
     return result;
   }
-  FillGapOfStart(Seconds(frame.stamp_ns - start_stamp_ns_));
   // The units of the map: metres, if the speed tells them.
-  const bool knows_way = config_.scale_source != ScaleSource::kCameraHeight && way_m_ > 0 &&
-                         !way_has_gap_ && way_sigma_m_ <= kWorstStartSigma * way_m_;
   scale_.Reset();
   fixes_.Reset();
-  const double units = knows_way ? way_m_ : 1.0;
-  if (knows_way) {
-    scale_.Measure(way_m_, way_sigma_m_, units);
-    HasTold(frame.speed_source, 0);
-  }
-  const Eigen::Isometry3d first_from_new = StretchedMonocularMotion(direction->inverse(), units);
-  if (!MakeFirstKeyframe(frame, first_from_new)) {
+  const std::optional<double> way_m = WayOfStart(frame);
+  const Eigen::Isometry3d first_from_new =
+      StretchedMonocularMotion(direction->inverse(), way_m.value_or(1.0));
+  const double step_s = Seconds(frame.stamp_ns - first_stamp_ns_);
+  if (!MakeFirstKeyframe(first_from_new, Se3Log(first_from_new) / step_s)) {
     BeginStart(frame);
     return result;
   }
-  started_ = true;
-  lost_ = false;
-  last_unscaled_ = Eigen::Isometry3d::Identity();
-  ForgetWay();
   path_.setIdentity();
   fixes_.AddPose(frame.stamp_ns, path_);
+  started_ = true;
+  lost_ = false;
   start_pose_ = result.world_from_camera;
   start_covariance_ = result.covariance;
   result.new_keyframe = true;
   result.keyframe_stamp_ns = frame.stamp_ns;
+  world_from_first_.reset();
   // One height of so few depths is too rough for a step: the path begins here.
-  if (!knows_way) {
+  if (!way_m) {
     start_stamp_ns_ = frame.stamp_ns;
     return result;
   }
-  const double scale = scale_.metres_per_unit();
+  world_from_first_ = result.world_from_camera;
   result.world_from_camera =
-      result.world_from_camera * StretchedMonocularMotion(first_from_new, scale);
+      *world_from_first_ *
+      StretchedMonocularMotion(map_from_first_.inverse(), scale_.metres_per_unit());
   result.state = VoState::kTracking;
   return result;
 }
 
-/// The depths of the start's second frame, by those that its first frame shows.
-bool MonocularOdometry::MakeFirstKeyframe(const MonocularFrame& frame,
-                                          const Eigen::Isometry3d& first_from_new) {
+/// The length of a start's motion by the speed, which is the map's scale from now on; none where no
+/// speed tells it.
+std::optional<double> MonocularOdometry::WayOfStart(const MonocularFrame& frame) {
+  if (config_.scale_source == ScaleSource::kCameraHeight) return std::nullopt;
+  Way way = start_way_;
+  way.FillGap(Seconds(frame.stamp_ns - first_stamp_ns_));
+  if (!(way.m > 0) || way.has_gap || way.sigma_m > kWorstStartSigma * way.m) return std::nullopt;
+  scale_.Reset();
+  scale_.Measure(way.m, way.sigma_m, way.m);
+  HasTold(frame.speed_source, 0);
+  return way.m;
+}
+
+/// Compares a provisional start with the frame, and makes it anew where that says so: then what the
+/// frame's pose is.
+std::optional<VoResult> MonocularOdometry::CheckStart(const MonocularFrame& frame,
+                                                      const VoResult& unscaled) {
+  if (!start_.IsProvisional()) return std::nullopt;
+  const double unit = map_from_first_.translation().norm();
+  const Eigen::Isometry3d new_from_first =
+      StretchedMonocularMotion(unscaled.world_from_camera.inverse() * map_from_first_, 1 / unit);
+  switch (start_.Check(odometry_.images()[0], new_from_first)) {
+    case TwoViewStart::Verdict::kRemake:
+      return RemakeStart(frame, unscaled);
+    case TwoViewStart::Verdict::kFails:
+      return GiveUp(frame);
+    case TwoViewStart::Verdict::kOpen:
+    case TwoViewStart::Verdict::kHolds:
+      break;
+  }
+  return std::nullopt;
+}
+
+/// The start anew, with the present frame as its second one: depths by the longer baseline, and the
+/// path corrected once. None, and nothing changed, where the corners show no motion.
+std::optional<VoResult> MonocularOdometry::RemakeStart(const MonocularFrame& frame,
+                                                       const VoResult& unscaled) {
+  const double depth_sigma = start_.DepthSigma();
+  const std::optional<Eigen::Isometry3d> direction = start_.Remake();
+  if (!direction) return std::nullopt;
+  const double units =
+      (map_from_first_.inverse() * unscaled.world_from_camera).translation().norm();
+  const double scale = scale_.metres_per_unit();
+  const std::optional<double> sigma = scale_.log_sigma();
+  const Eigen::Isometry3d step = last_unscaled_.inverse() * unscaled.world_from_camera;
+  VoResult result = InMetres(frame, unscaled);
+  scale_.Reset();
+  const std::optional<double> way_m = WayOfStart(frame);
+  if (!way_m && sigma) scale_.Measure(scale, scale * std::hypot(*sigma, depth_sigma), 1);
+  // Where nobody knows metres, depths are looked for in units of the baseline.
+  const double stretch = way_m.value_or(sigma ? units : 1.0) / units;
+  std::optional<Vector6d> twist = unscaled.twist;
+  if (twist) twist->head<3>() *= stretch;
+  odometry_.Reset();
+  odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
+  if (!MakeFirstKeyframe(StretchedMonocularMotion(direction->inverse(), units * stretch), twist)) {
+    return GiveUp(frame);
+  }
+  if (way_m || !sigma) {
+    path_.setIdentity();
+    fixes_.Reset();
+    fixes_.AddPose(frame.stamp_ns, path_);
+  } else {
+    MeasureByFixes(frame.stamp_ns, step);
+  }
+  if (way_m && world_from_first_) {
+    result.world_from_camera =
+        *world_from_first_ *
+        StretchedMonocularMotion(map_from_first_.inverse(), scale_.metres_per_unit());
+  }
+  if (result.twist) {
+    result.twist->head<3>() *= stretch * scale_.metres_per_unit() / scale;
+  }
+  if (result.state == VoState::kTracking) {
+    start_pose_ = result.world_from_camera;
+    start_covariance_ = result.covariance;
+  }
+  result.new_keyframe = true;
+  result.keyframe_stamp_ns = frame.stamp_ns;
+  return result;
+}
+
+/// The path goes no further: the start begins anew.
+VoResult MonocularOdometry::GiveUp(const MonocularFrame& frame) {
+  lost_ = true;
+  lost_since_ns_ = frame.stamp_ns;
+  fixes_.Reset();
+  last_.state = VoState::kLost;
+  const VoResult held = Held(frame);
+  BeginStart(frame);
+  return held;
+}
+
+/// The depths of the start's second frame, by those that its first frame shows: a new map, whose
+/// origin is the second frame's camera.
+bool MonocularOdometry::MakeFirstKeyframe(const Eigen::Isometry3d& first_from_new,
+                                          const std::optional<Vector6d>& twist) {
   if (worker_) worker_->Cancel();
-  learner_.Restart(start_.first(), first_from_new.inverse());
+  map_from_first_ = first_from_new.inverse();
+  last_unscaled_ = Eigen::Isometry3d::Identity();
+  ForgetWay();
+  learner_.Restart(start_.first(), map_from_first_);
   const LearntDepths learnt = learner_.Learn(odometry_.images()[0], Eigen::Isometry3d::Identity(),
                                              scale_.metres_per_unit());
   OnLearnt(learnt);
-  const double step_s = Seconds(frame.stamp_ns - start_stamp_ns_);
-  return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma,
-                               Se3Log(first_from_new) / step_s);
+  return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, twist);
 }
 
 VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
@@ -259,15 +356,8 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
     return held;
   }
   lost_ = false;
-  if (Slides(last_unscaled_.inverse() * unscaled.world_from_camera)) {
-    lost_ = true;
-    lost_since_ns_ = frame.stamp_ns;
-    fixes_.Reset();
-    last_.state = VoState::kLost;
-    const VoResult held = Held(frame);
-    BeginStart(frame);
-    return held;
-  }
+  if (Slides(last_unscaled_.inverse() * unscaled.world_from_camera)) return GiveUp(frame);
+  if (const auto remade = CheckStart(frame, unscaled)) return *remade;
   MeasureScale(unscaled.world_from_camera);
   if (unscaled.keyframe_due) {
     unscaled.new_keyframe = MakeKeyframe(frame, unscaled) || unscaled.new_keyframe;
@@ -363,14 +453,14 @@ void MonocularOdometry::HasTold(MetresSource source, double shared_sigma) {
 
 void MonocularOdometry::MeasureScale(const Eigen::Isometry3d& world_from_camera) {
   way_units_ += (last_unscaled_.inverse() * world_from_camera).translation().norm();
-  if (way_has_gap_) {
+  if (way_.has_gap) {
     ForgetWay();
     return;
   }
-  if (config_.scale_source == ScaleSource::kCameraHeight || way_m_ < kScaleWayM) return;
+  if (config_.scale_source == ScaleSource::kCameraHeight || way_.m < kScaleWayM) return;
   const bool by_fixes = last_frame_ && last_frame_->speed_source == MetresSource::kFixes;
-  if (way_m_ >= config_.min_speed_mps * way_s_ && !by_fixes) {
-    scale_.Measure(way_m_, way_sigma_m_, way_units_);
+  if (way_.m >= config_.min_speed_mps * way_.s && !by_fixes) {
+    scale_.Measure(way_.m, way_.sigma_m, way_units_);
     HasTold(last_frame_->speed_source, 0);
   }
   ForgetWay();

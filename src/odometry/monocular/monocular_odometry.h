@@ -85,7 +85,9 @@ class MonocularOdometry {
   MonocularOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics);
 
   /// Works off the next frame: poses in metres. Initialising, with a pose that says nothing, until
-  /// the camera has moved far enough to see depth. Throws as EdgeOdometry::Track().
+  /// the camera has moved far enough to see depth. The frames after a start by a short way verify
+  /// it; where it is made anew, the pose corrects those since then. Throws as
+  /// EdgeOdometry::Track().
   VoResult Track(const MonocularFrame& frame);
 
   /// A fix of kBest; it may come before the frame of its moment or after it.
@@ -111,17 +113,30 @@ class MonocularOdometry {
   MetresSource metres_source() const { return source_; }
 
  private:
+  /// A distance by the speed.
+  struct Way {
+    double m = 0, s = 0;
+    double sigma_m = 0;    ///< Standard deviation of it.
+    bool has_gap = false;  ///< A frame since it began came without a speed.
+    void Add(const MonocularFrame& from, const MonocularFrame& to, double default_sigma_mps);
+    void FillGap(double elapsed_s);
+  };
+
   VoResult Start(const MonocularFrame& frame);
   VoResult Continue(const MonocularFrame& frame);
   VoResult Held(const MonocularFrame& frame) const;
   void BeginStart(const MonocularFrame& frame);
-  bool MakeFirstKeyframe(const MonocularFrame& frame, const Eigen::Isometry3d& first_from_new);
+  bool MakeFirstKeyframe(const Eigen::Isometry3d& first_from_new,
+                         const std::optional<Vector6d>& twist);
   bool MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled);
   bool TakeKeyframe();
   void OnLearnt(const LearntDepths& learnt);
   void AddWay(const MonocularFrame& frame);
   void ForgetWay();
-  void FillGapOfStart(double elapsed_s);
+  std::optional<double> WayOfStart(const MonocularFrame& frame);
+  std::optional<VoResult> CheckStart(const MonocularFrame& frame, const VoResult& unscaled);
+  std::optional<VoResult> RemakeStart(const MonocularFrame& frame, const VoResult& unscaled);
+  VoResult GiveUp(const MonocularFrame& frame);
   void MeasureScale(const Eigen::Isometry3d& world_from_camera);
   void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& step);
   void MeasureByHeight(double height_units);
@@ -145,11 +160,12 @@ class MonocularOdometry {
   ImagePyramid start_images_;
   bool started_ = false;
   bool lost_ = false;
-  double way_m_ = 0;          // By the speed, since the last measurement of the scale.
-  double way_s_ = 0;          // Duration of it,
-  double way_sigma_m_ = 0;    // and its standard deviation.
-  double way_units_ = 0;      // By visual odometry, since then.
-  bool way_has_gap_ = false;  // A frame since then came without a speed.
+  Way way_;               // Since the last measurement of the scale.
+  double way_units_ = 0;  // By visual odometry, since then.
+  Way start_way_;         // Since the start's first frame.
+  // Of the start's first frame: in the map, and on the path where metres were known.
+  Eigen::Isometry3d map_from_first_ = Eigen::Isometry3d::Identity();
+  std::optional<Eigen::Isometry3d> world_from_first_;
   MetresSource source_ = MetresSource::kNone;
   std::int64_t now_ns_ = 0;           // Of the present frame.
   std::int64_t told_ns_ = 0;          // Of the last frame for which source_ told metres.
@@ -160,6 +176,7 @@ class MonocularOdometry {
   std::int64_t height_told_ns_ = 0;  // Of the last frame whose road told metres.
   std::int64_t ordered_ns_ = 0;      // Of the keyframe in work.
   std::int64_t start_stamp_ns_ = 0;
+  std::int64_t first_stamp_ns_ = 0;  // Of the start's first frame.
   std::int64_t lost_since_ns_ = 0;
   std::optional<MonocularFrame> last_frame_;
   Eigen::Isometry3d start_pose_ = Eigen::Isometry3d::Identity();

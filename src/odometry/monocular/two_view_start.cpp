@@ -19,9 +19,25 @@ constexpr double kCornerDistancePx = 8;
 constexpr float kThereAndBackPx = 1.0F;
 constexpr double kConfidence = 0.9999;
 
+/// The 95 % quantile of chi-square with two degrees of freedom. If half of the corners are further
+/// off, what the image contradicts is no noise.
+constexpr double kChiSquare95 = 5.99;
+/// So many images that agree verify a start of enough parallax; so many that do not refute one.
+constexpr int kImagesThatTell = 2;
+/// A baseline with so many times the parallax of the start's is worth its depths anew.
+constexpr double kMuchLonger = 1.5;
+/// A refuted start needs a baseline that is longer at all.
+constexpr double kLonger = 1.2;
+
 Eigen::Vector3d StartRayOf(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
   return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
           (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
+}
+
+/// By how much a point moves over the image for each unit of its inverse depth, px.
+Eigen::Vector2d LineOf(const Eigen::Vector3d& seen, const Eigen::Vector3d& translation,
+                       double focal_px) {
+  return focal_px / seen.z() * (translation.head<2>() - seen.hnormalized() * translation.z());
 }
 
 double MedianOfWays(std::vector<double>& ways) {
@@ -39,34 +55,116 @@ void TwoViewStart::Begin(const cv::Mat& grey) {
   grey.copyTo(first_);
   grey.copyTo(last_);
   cv::goodFeaturesToTrack(first_, begin_, config_.corners, kCornerQuality, kCornerDistancePx);
-  end_ = begin_;
+  second_ = end_ = begin_;
   just_begun_ = true;
+  provisional_ = false;
+}
+
+void TwoViewStart::FollowCorners(const cv::Mat& grey) {
+  if (end_.empty()) return;
+  std::vector<cv::Point2f> now, back;
+  std::vector<std::uint8_t> found, found_back;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(last_, grey, end_, now, found, error);
+  cv::calcOpticalFlowPyrLK(grey, last_, now, back, found_back, error);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const cv::Point2f way = back[i] - end_[i];
+    const bool same = std::hypot(way.x, way.y) <= kThereAndBackPx;
+    found[i] = found[i] != 0 && found_back[i] != 0 && same ? 1 : 0;
+  }
+  KeepFollowed(now, found);
+  grey.copyTo(last_);
 }
 
 std::optional<Eigen::Isometry3d> TwoViewStart::Follow(const cv::Mat& grey) {
-  std::vector<cv::Point2f> now, back;
-  std::vector<std::uint8_t> found, found_back;
-  if (!end_.empty()) {
-    std::vector<float> error;
-    cv::calcOpticalFlowPyrLK(last_, grey, end_, now, found, error);
-    cv::calcOpticalFlowPyrLK(grey, last_, now, back, found_back, error);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const cv::Point2f way = back[i] - end_[i];
-      const bool same = std::hypot(way.x, way.y) <= kThereAndBackPx;
-      found[i] = found[i] != 0 && found_back[i] != 0 && same ? 1 : 0;
-    }
-    KeepFollowed(now, found);
-  }
+  FollowCorners(grey);
   if (end_.size() < static_cast<std::size_t>(config_.min_corners)) {
     Begin(grey);
     return std::nullopt;
   }
-  grey.copyTo(last_);
   just_begun_ = false;
   if (MedianWayPx() < config_.min_way * camera_.width) return std::nullopt;
   std::optional<Eigen::Isometry3d> motion = Motion();
-  if (!motion && MedianWayPx() > config_.longest_way * camera_.width) Begin(grey);
+  if (motion) {
+    TakePair(*motion);
+  } else if (MedianWayPx() > config_.longest_way * camera_.width) {
+    Begin(grey);
+  }
   return motion;
+}
+
+/// The last image becomes the second one.
+void TwoViewStart::TakePair(const Eigen::Isometry3d& second_from_first) {
+  second_ = end_;
+  second_from_first_ = second_from_first;
+  parallax_px_ = MedianParallaxPx();
+  agreeing_ = contradicting_ = 0;
+  provisional_ = true;
+}
+
+/// Both ends of the parallax err.
+double TwoViewStart::DepthSigma() const {
+  return std::sqrt(2.0) * config_.pixel_sigma / parallax_px_;
+}
+
+TwoViewStart::Verdict TwoViewStart::Check(const cv::Mat& grey,
+                                          const Eigen::Isometry3d& new_from_first) {
+  FollowCorners(grey);
+  if (end_.size() < static_cast<std::size_t>(config_.min_corners)) {
+    provisional_ = false;
+    return contradicting_ >= kImagesThatTell ? Verdict::kFails : Verdict::kHolds;
+  }
+  const double miss = MedianMiss(new_from_first);
+  ++(miss > kChiSquare95 ? contradicting_ : agreeing_);
+  const double parallax_px = MedianParallaxPx();
+  const bool certain = DepthSigma() <= config_.enough_depth_sigma;
+  if (contradicting_ >= kImagesThatTell && parallax_px > kLonger * parallax_px_) {
+    return Verdict::kRemake;
+  }
+  if (!certain && parallax_px >= kMuchLonger * parallax_px_) return Verdict::kRemake;
+  if (certain && agreeing_ >= kImagesThatTell && contradicting_ < kImagesThatTell) {
+    provisional_ = false;
+    return Verdict::kHolds;
+  }
+  return Verdict::kOpen;
+}
+
+std::optional<Eigen::Isometry3d> TwoViewStart::Remake() {
+  const std::optional<Eigen::Isometry3d> motion = Motion();
+  if (motion) TakePair(*motion);
+  return motion;
+}
+
+/// How far the corners are from where the start's depths and this motion lead them: the median of
+/// their squared distances over the covariance (Mahalanobis) that the noise of a pixel gives.
+double TwoViewStart::MedianMiss(const Eigen::Isometry3d& new_from_first) const {
+  const double focal_px = camera_.fx;
+  const double variance = config_.pixel_sigma * config_.pixel_sigma;
+  std::vector<double> misses;
+  for (std::size_t i = 0; i < begin_.size(); ++i) {
+    const Eigen::Vector3d first = StartRayOf(begin_[i], camera_);
+    const Eigen::Vector3d second = StartRayOf(second_[i], camera_);
+    // The inverse depth that brings the corner nearest to its place in the second image.
+    const Eigen::Vector3d at_infinity = second_from_first_.linear() * first;
+    const Eigen::Vector3d& move = second_from_first_.translation();
+    const Eigen::Vector3d along = second.cross(move);
+    const double inverse_depth = -along.dot(second.cross(at_infinity)) / along.squaredNorm();
+    const Eigen::Vector2d second_line = LineOf(at_infinity + inverse_depth * move, move, focal_px);
+    const Eigen::Vector3d seen =
+        new_from_first.linear() * first + inverse_depth * new_from_first.translation();
+    if (!(seen.z() > 0) || !std::isfinite(inverse_depth)) {
+      misses.push_back(std::numeric_limits<double>::infinity());
+      continue;
+    }
+    const Eigen::Vector2d miss =
+        focal_px * (StartRayOf(end_[i], camera_).hnormalized() - seen.hnormalized());
+    const Eigen::Vector2d line = LineOf(seen, new_from_first.translation(), focal_px);
+    const Eigen::Matrix2d covariance =
+        2 * variance *
+        (Eigen::Matrix2d::Identity() + line * line.transpose() / second_line.squaredNorm());
+    misses.push_back(miss.dot(covariance.inverse() * miss));
+  }
+  return MedianOfWays(misses);
 }
 
 void TwoViewStart::KeepFollowed(const std::vector<cv::Point2f>& now,
@@ -75,9 +173,11 @@ void TwoViewStart::KeepFollowed(const std::vector<cv::Point2f>& now,
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] == 0) continue;
     begin_[kept] = begin_[i];
+    second_[kept] = second_[i];
     end_[kept++] = now[i];
   }
   begin_.resize(kept);
+  second_.resize(kept);
   end_.resize(kept);
 }
 
