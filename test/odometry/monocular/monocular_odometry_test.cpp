@@ -246,6 +246,37 @@ TEST(MonocularOdometry, WithoutMetresThePoseIsHeldUntilFixesTellThem) {
   EXPECT_LT(*odometry.metres_sigma(), 0.1);
 }
 
+TEST(MonocularOdometry, NoiseOfAGreyLevelHardlyMovesTheMetresByFixes) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    MonocularOdometry odometry(OnBoard(), WalkCamera().intrinsics);
+    cv::RNG random(seed);
+    std::optional<int> begin;
+    Eigen::Isometry3d world_from_begin = Eigen::Isometry3d::Identity();
+    VoResult result;
+    for (int i = 0; i < kFrames; ++i) {
+      if (i > 0) {
+        geo::Fix fix = FixOfWalk(i - 1);
+        fix.stamp_ns += 1'700'000'000'000'000'000;
+        odometry.AddFix(fix);
+      }
+      MonocularFrame frame = LaterFrame(i, std::nullopt);
+      cv::Mat noise(frame.grey.size(), CV_16SC1), noisy;
+      random.fill(noise, cv::RNG::NORMAL, 0, 1);
+      cv::add(frame.grey, noise, noisy, cv::noArray(), CV_8U);
+      frame.grey = noisy;
+      result = odometry.Track(frame);
+      if (result.state != VoState::kTracking || begin) continue;
+      begin = i;
+      world_from_begin = result.world_from_camera;
+    }
+    ASSERT_TRUE(begin) << "seed " << seed;
+    const double way_m = kSpeedMps * kFrameS * (kFrames - 1 - *begin);
+    EXPECT_NEAR((world_from_begin.inverse() * result.world_from_camera).translation().norm(), way_m,
+                0.1 * way_m)
+        << "seed " << seed;
+  }
+}
+
 TEST(MonocularOdometry, WhenTheSpeedEndsTheMetresAreHeldLessAndLessCertain) {
   MonocularOdometry::Config config = OnBoard();
   config.source_age_s = 0.3;
