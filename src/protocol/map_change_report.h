@@ -23,6 +23,7 @@ struct MapChangeReport {
   std::uint32_t missed = 0;           ///< and that should, but do not.
   geo::GeoPoint position;             ///< Of its foot on the road.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< East-north axes.
+  std::string zone;  ///< Id of the zone in which the object lies; empty at the zone.
 };
 
 }  // namespace livemap::protocol

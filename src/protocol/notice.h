@@ -32,6 +32,7 @@ struct Notice {
   std::uint32_t told = 0;           ///< kCaughtUp: hazards told since the kCaughtUp before.
   std::string image_format;         ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.
+  std::string zone;                 ///< Id of the zone that says so; empty at the zone.
 };
 
 }  // namespace livemap::protocol

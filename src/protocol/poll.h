@@ -29,6 +29,7 @@ struct Poll {
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< As in Report.
   PollPicture picture = PollPicture::kNone;
   std::uint32_t max_picture_bytes = 0;
+  std::string zone;  ///< Id of the zone that asks; empty at the zone.
 };
 
 /// What a vehicle saw at a hazard's place (HazardPollAnswer.msg without ROS).
@@ -46,6 +47,7 @@ struct PollAnswer {
   double course_rad = 0;           ///< Clockwise from true north; NaN when standing.
   std::string image_format;        ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;
+  std::string zone;  ///< Id of the zone that asked; empty at the zone.
 };
 
 }  // namespace livemap::protocol

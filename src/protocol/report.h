@@ -33,6 +33,7 @@ struct Report {
   std::string image_format;         ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;  ///< Annotated picture as a compressed file; may be empty.
   imaging::PixelRegion shown;       ///< What of the original image the picture shows.
+  std::string zone;                 ///< Id of the zone in which the hazard lies; empty at the zone.
 };
 
 /// The zone's answer to one report.
@@ -46,6 +47,7 @@ struct Receipt {
   Uuid hazard_uuid;        ///< The hazard it became or was merged into; nil when refused.
   std::string vehicle_id;  ///< Addressee.
   std::string reason;      ///< One sentence, empty when committed.
+  std::string zone;        ///< Id of the zone that answers; empty at the zone.
 };
 
 }  // namespace livemap::protocol

@@ -75,7 +75,7 @@ struct Template {
     SqliteDatabase open(path, false);
     tables = {ReadFuzzTable(open, "known", "id", Literal(20)),
               ReadFuzzTable(open, "pending", "uuid", Literal(1)), ReadFuzzTable(open, "gone", "id"),
-              ReadFuzzTable(open, "zone", "map_sequence")};
+              ReadFuzzTable(open, "zones", "zone")};
   }
   ~Template() { std::filesystem::remove_all(folder); }
 

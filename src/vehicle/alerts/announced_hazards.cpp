@@ -26,13 +26,13 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
   if (!std::filesystem::exists(path, error)) return std::nullopt;
   SqliteDatabase database(path, false);
   SqliteStatement tables = database.Prepare(
-      "SELECT count(*) FROM sqlite_master WHERE type='table' AND name IN ('known','gone','zone')");
+      "SELECT count(*) FROM sqlite_master WHERE type='table' AND name IN ('known','gone','zones')");
   if (!tables.Step() || tables.Int(0) != 3) return std::nullopt;
   tables.Reset();
   StoredHazards stored;
   database.Transaction([&] {
     SqliteStatement rows = database.Prepare(
-        "SELECT id,class_name,latitude,longitude,sequence FROM known"
+        "SELECT id,class_name,latitude,longitude,sequence,substr(zone,1,64) FROM known"
         " WHERE of_zone=1 AND sequence>0 AND typeof(id)='blob' AND length(id)=16");
     while (rows.Step()) {
       StoredHazards::Row row;
@@ -41,21 +41,32 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
       row.hazard.class_name = rows.Text(1);
       row.hazard.position = {rows.Real(2), rows.Real(3)};
       row.sequence = static_cast<std::uint64_t>(rows.Int(4));
+      row.zone = rows.Text(5);
       if (geo::IsValid(row.hazard.position)) stored.rows.push_back(row);
     }
     SqliteStatement newest = database.Prepare(
-        "SELECT max(sequence) FROM (SELECT sequence FROM known WHERE of_zone=1"
-        " UNION ALL SELECT sequence FROM gone UNION ALL SELECT map_sequence FROM zone)");
-    if (newest.Step()) stored.sequence = static_cast<std::uint64_t>(newest.Int(0));
+        "SELECT substr(zone,1,64),max(sequence) FROM"
+        " (SELECT zone,sequence FROM known WHERE of_zone=1"
+        " UNION ALL SELECT zone,sequence FROM gone"
+        " UNION ALL SELECT zone,map_sequence FROM zones) GROUP BY 1");
+    while (newest.Step()) {
+      stored.sequences[newest.Text(0)] = static_cast<std::uint64_t>(newest.Int(1));
+    }
   });
   return stored;
 }
 
-bool AnnouncedHazards::IsOld(const Uuid& id, std::uint64_t sequence) const {
-  const auto there = sequences_.find(id);
-  if (there != sequences_.end()) return sequence <= there->second;
+/// Whether the zone has said something newer about the hazard, or it is another zone's.
+bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word) const {
+  const auto is_old = [&word](const Word& known) {
+    // A map that knows one zone only names none.
+    const bool is_same = word.zone == known.zone || word.zone.empty() || known.zone.empty();
+    return !is_same || word.sequence <= known.sequence;
+  };
+  const auto there = there_.find(id);
+  if (there != there_.end()) return is_old(there->second);
   const auto gone = gone_.find(id);
-  return gone != gone_.end() && sequence <= gone->second;
+  return gone != gone_.end() && is_old(gone->second);
 }
 
 AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice) {
@@ -63,39 +74,57 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   Changes changes;
   // The end of a catch-up says what is gone by leaving it out: the map works that out.
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
-  if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, notice.sequence)) return changes;
+  const Word word{notice.zone, notice.sequence};
+  if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, word)) return changes;
   if (notice.action == Action::kRemoved) {
     if (gone_.size() >= kRemovedKept) gone_.clear();
-    gone_[notice.hazard_uuid] = notice.sequence;
-    if (sequences_.erase(notice.hazard_uuid) > 0) changes.gone.push_back(notice.hazard_uuid);
+    gone_[notice.hazard_uuid] = word;
+    if (there_.erase(notice.hazard_uuid) > 0) changes.gone.push_back(notice.hazard_uuid);
     return changes;
   }
-  sequences_[notice.hazard_uuid] = notice.sequence;
+  there_[notice.hazard_uuid] = word;
   gone_.erase(notice.hazard_uuid);
   changes.put.push_back({notice.hazard_uuid, notice.class_name, notice.position,
                          SigmaOf(notice.covariance_m2), std::nullopt});
   return changes;
 }
 
+/// Those that count anew: of before, only what the map still has is there.
+std::set<std::string> AnnouncedHazards::ZonesBegunAnew(const StoredHazards& stored) const {
+  std::set<std::string> zones;
+  for (const auto& [zone, before] : stored_sequences_) {
+    const auto now = stored.sequences.find(zone);
+    if (now == stored.sequences.end() || now->second < before) zones.insert(zone);
+  }
+  return zones;
+}
+
 AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
   Changes changes;
-  // The zone began to count anew: of before, only what the map still has is there.
-  const bool began_anew = stored.sequence < stored_sequence_;
-  stored_sequence_ = stored.sequence;
-  if (began_anew) gone_.clear();
+  const std::set<std::string> anew = ZonesBegunAnew(stored);
+  stored_sequences_ = stored.sequences;
+  for (auto gone = gone_.begin(); gone != gone_.end();) {
+    gone = anew.count(gone->second.zone) != 0 ? gone_.erase(gone) : std::next(gone);
+  }
   std::unordered_set<Uuid> in_map;
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
-    if (!began_anew && IsOld(row.hazard.id, row.sequence)) continue;
-    sequences_[row.hazard.id] = row.sequence;
+    const Word word{row.zone, row.sequence};
+    if (anew.count(row.zone) == 0 && IsOld(row.hazard.id, word)) continue;
+    there_[row.hazard.id] = word;
     changes.put.push_back(row.hazard);
   }
-  for (auto there = sequences_.begin(); there != sequences_.end();) {
+  for (auto there = there_.begin(); there != there_.end();) {
     // What is newer than all that the map has taken in will come into it yet.
+    const Word& word = there->second;
+    auto taken_in = stored.sequences.find(word.zone);
+    if (taken_in == stored.sequences.end()) taken_in = stored.sequences.find("");
+    const bool is_taken_in =
+        taken_in != stored.sequences.end() && word.sequence <= taken_in->second;
     const bool gone =
-        in_map.count(there->first) == 0 && (began_anew || there->second <= stored.sequence);
+        in_map.count(there->first) == 0 && (anew.count(word.zone) != 0 || is_taken_in);
     if (gone) changes.gone.push_back(there->first);
-    there = gone ? sequences_.erase(there) : std::next(there);
+    there = gone ? there_.erase(there) : std::next(there);
   }
   std::sort(changes.gone.begin(), changes.gone.end());
   return changes;

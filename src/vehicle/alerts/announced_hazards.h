@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -18,10 +20,11 @@ struct StoredHazards {
   struct Row {
     AlertHazard hazard;
     std::uint64_t sequence = 0;  ///< Of the newest announcement about it.
+    std::string zone;            ///< Id of the zone that announced it.
   };
   std::vector<Row> rows;
-  /// The highest sequence that the map has taken in.
-  std::uint64_t sequence = 0;
+  /// The highest sequence of each zone that the map has taken in, by the zone's id.
+  std::map<std::string, std::uint64_t> sequences;
 };
 
 /// Reads the database of a LocalHazardMap, which another object may have open and write to. The
@@ -30,9 +33,10 @@ struct StoredHazards {
 /// when it cannot be read.
 std::optional<StoredHazards> ReadStoredHazards(const std::string& path);
 
-/// The hazards that the zone has announced: by its notices as they come, and by the vehicle's local
+/// The hazards that zones have announced: by their notices as they come, and by the vehicle's local
 /// map, which knows what came before the start and is told again what was missed. The newer word
-/// counts, by its sequence. Not thread-safe.
+/// of the hazard's zone counts, by its sequence; another zone's word about it does not. Not
+/// thread-safe.
 class AnnouncedHazards {
  public:
   /// What changes for the driver.
@@ -43,14 +47,21 @@ class AnnouncedHazards {
 
   Changes Apply(const protocol::Notice& notice);
   Changes Apply(const StoredHazards& stored);
-  std::size_t size() const { return sequences_.size(); }
+  std::size_t size() const { return there_.size(); }
 
  private:
-  bool IsOld(const Uuid& id, std::uint64_t sequence) const;
+  /// The newest word about a hazard.
+  struct Word {
+    std::string zone;
+    std::uint64_t sequence = 0;
+  };
 
-  std::unordered_map<Uuid, std::uint64_t> sequences_;  // Of what is there.
-  std::unordered_map<Uuid, std::uint64_t> gone_;       // Of what was removed since the start.
-  std::uint64_t stored_sequence_ = 0;
+  bool IsOld(const Uuid& id, const Word& word) const;
+  std::set<std::string> ZonesBegunAnew(const StoredHazards& stored) const;
+
+  std::unordered_map<Uuid, Word> there_;
+  std::unordered_map<Uuid, Word> gone_;  // Removed since the start.
+  std::map<std::string, std::uint64_t> stored_sequences_;
 };
 
 }  // namespace livemap::vehicle

@@ -15,20 +15,24 @@ namespace {
 constexpr int kChangeUrgency = 1;
 
 const std::vector<std::string>& MapChangeMigrations() {
-  static const std::vector<std::string> migrations = {R"sql(
+  static const std::vector<std::string> migrations = {
+      R"sql(
     CREATE TABLE pending(
       uuid BLOB PRIMARY KEY, drive_id TEXT NOT NULL, stamp_ns INTEGER NOT NULL,
       earlier_stamp_ns INTEGER NOT NULL, class_name TEXT NOT NULL, vanished INTEGER NOT NULL,
       confidence REAL NOT NULL, seen INTEGER NOT NULL, missed INTEGER NOT NULL,
       latitude REAL NOT NULL, longitude REAL NOT NULL,
       var_east REAL NOT NULL, cov_east_north REAL NOT NULL, var_north REAL NOT NULL
-    ) WITHOUT ROWID)sql"};
+    ) WITHOUT ROWID)sql",
+      // Empty: that of before is named at the start.
+      "ALTER TABLE pending ADD COLUMN zone TEXT "
+      "NOT NULL DEFAULT ''"};
   return migrations;
 }
 
 void InsertMapChange(SqliteDatabase& database, const protocol::MapChangeReport& report) {
   SqliteStatement insert =
-      database.Prepare("INSERT OR REPLACE INTO pending VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+      database.Prepare("INSERT OR REPLACE INTO pending VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
       .Bind(2, report.drive_id)
       .Bind(3, report.stamp_ns)
@@ -42,7 +46,8 @@ void InsertMapChange(SqliteDatabase& database, const protocol::MapChangeReport& 
       .Bind(11, report.position.longitude_deg)
       .Bind(12, report.covariance_m2(0, 0))
       .Bind(13, report.covariance_m2(0, 1))
-      .Bind(14, report.covariance_m2(1, 1));
+      .Bind(14, report.covariance_m2(1, 1))
+      .Bind(15, report.zone);
   insert.Execute();
 }
 
@@ -59,6 +64,7 @@ protocol::MapChangeReport ReadMapChangeRow(const SqliteStatement& row) {
   report.missed = static_cast<std::uint32_t>(row.Int(8));
   report.position = {row.Real(9), row.Real(10)};
   report.covariance_m2 << row.Real(11), row.Real(12), row.Real(12), row.Real(13);
+  report.zone = row.Text(14);
   return report;
 }
 
@@ -81,15 +87,24 @@ MapChangeOutbox::MapChangeOutbox(const Config& config, std::mt19937_64 random, s
   Load(steady_s);
 }
 
+/// The zone of what names the zone `named`, or none.
+std::string MapChangeOutbox::ZoneOf(const std::string& named) const {
+  if (config_.zone.empty()) return "";
+  return named.empty() ? config_.zone : named;
+}
+
 void MapChangeOutbox::Load(double steady_s) {
+  if (!config_.zone.empty()) {
+    database_->Prepare("UPDATE pending SET zone=? WHERE zone=''").Bind(1, config_.zone).Execute();
+  }
   // Of a text that something else made endless only the beginning is fetched: too long as it is.
   SqliteStatement rows = database_->Prepare(
       "SELECT substr(uuid, 1, 17), substr(drive_id, 1, 65), stamp_ns, earlier_stamp_ns, "
       "substr(class_name, 1, 65), vanished, confidence, seen, missed, latitude, longitude, "
-      "var_east, cov_east_north, var_north FROM pending");
+      "var_east, cov_east_north, var_north, substr(zone, 1, 65) FROM pending");
   while (rows.Step()) {
     const protocol::MapChangeReport report = ReadMapChangeRow(rows);
-    if (!IsSound(report)) {
+    if (!IsSound(report) || report.zone.size() > kMaxIdBytes) {
       ++counters_.unsound;
       continue;
     }
@@ -104,8 +119,10 @@ void MapChangeOutbox::Add(const protocol::MapChangeReport& report, double steady
     throw Error("a change of class '" + report.class_name.substr(0, kMaxIdBytes) +
                 "' has values that no zone accepts");
   }
-  InsertMapChange(*database_, report);
-  pending_[report.uuid] = report;
+  protocol::MapChangeReport stored = report;
+  stored.zone = ZoneOf(report.zone);
+  InsertMapChange(*database_, stored);
+  pending_[report.uuid] = std::move(stored);
   schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
   ++counters_.added;
   Displace();
@@ -123,7 +140,8 @@ std::vector<protocol::MapChangeReport> MapChangeOutbox::TakeDue(double steady_s,
 }
 
 void MapChangeOutbox::AddReceipt(const protocol::Receipt& receipt) {
-  if (pending_.count(receipt.report_uuid) == 0) return;
+  const auto answered = pending_.find(receipt.report_uuid);
+  if (answered == pending_.end() || answered->second.zone != ZoneOf(receipt.zone)) return;
   Erase(receipt.report_uuid);
   ++(receipt.status == protocol::Receipt::Status::kCommitted ? counters_.committed
                                                              : counters_.refused);

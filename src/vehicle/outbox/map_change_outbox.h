@@ -20,7 +20,9 @@ namespace livemap::vehicle {
 class MapChangeOutbox {
  public:
   struct Config {
-    std::string path;         ///< SQLite; made when missing.
+    std::string path;  ///< SQLite; made when missing.
+    /// Id of the configured zone, as for LocalHazardMap. Empty: there is one zone only.
+    std::string zone;
     std::size_t most = 1000;  ///< Unanswered reports; beyond it the oldest go, and are counted.
     ResendSchedule::Config resend;
   };
@@ -47,13 +49,15 @@ class MapChangeOutbox {
   void Add(const protocol::MapChangeReport& report, double steady_s);
   /// Reports that are to be sent now; steady seconds from any origin. They stay until answered.
   std::vector<protocol::MapChangeReport> TakeDue(double steady_s, std::size_t limit);
-  /// The zone's answer ends its report; one of another report is ignored. Throws StoreError.
+  /// The zone's answer ends its report; one of another report, or of another zone than the
+  /// report's, is ignored. Throws StoreError.
   void AddReceipt(const protocol::Receipt& receipt);
 
   std::size_t pending() const { return pending_.size(); }
   const Counters& counters() const { return counters_; }
 
  private:
+  std::string ZoneOf(const std::string& named) const;
   void Load(double steady_s);
   void Erase(const Uuid& uuid);
   void Displace();
@@ -67,7 +71,7 @@ class MapChangeOutbox {
 };
 
 /// Whether a vehicle can have made this report: a version 4 uuid, ids of at most 64 bytes, finite
-/// numbers within their ranges, a covariance that is one.
+/// numbers within their ranges, a covariance that is one. Its zone is for the outbox to know.
 bool IsSound(const protocol::MapChangeReport& report);
 
 }  // namespace livemap::vehicle

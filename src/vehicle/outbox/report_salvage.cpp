@@ -136,6 +136,11 @@ std::unique_ptr<SqliteDatabase> OpenSalvageCopy(const ReportSalvageCopy& copy) {
   } catch (const StoreError&) {
     database->Execute(kAddShownRegionAndHold);  // Of an older LiveMap.
   }
+  try {
+    database->Prepare("SELECT zone FROM pending WHERE rowid=0").Reset();
+  } catch (const StoreError&) {
+    database->Execute(kAddZoneOfReport);  // The same.
+  }
   return database;
 }
 

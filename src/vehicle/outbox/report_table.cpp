@@ -11,7 +11,7 @@ constexpr char kSelectReport[] =
     "SELECT drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,latitude,longitude,"
     "variance_east,covariance_east_north,variance_north,"
     "image_width,image_height,image_frame_id,image_format,image,uuid,sent,"
-    "shown_x,shown_y,shown_width,shown_height,hold_until_ns FROM pending ";
+    "shown_x,shown_y,shown_width,shown_height,hold_until_ns,zone FROM pending ";
 
 /// Of a row of kSelectReport.
 protocol::Report ReadStoredReport(const SqliteStatement& row) {
@@ -32,6 +32,7 @@ protocol::Report ReadStoredReport(const SqliteStatement& row) {
   report.uuid = UuidFromBlob(row.Blob(18));
   const auto pixels = [&row](int column) { return static_cast<std::uint32_t>(row.Int(column)); };
   report.shown = {pixels(20), pixels(21), pixels(22), pixels(23)};
+  report.zone = row.Text(25);
   return report;
 }
 
@@ -60,14 +61,17 @@ const char* const kAddShownRegionAndHold =
     "ALTER TABLE pending ADD COLUMN shown_height INTEGER NOT NULL DEFAULT 0;"
     "ALTER TABLE pending ADD COLUMN hold_until_ns INTEGER NOT NULL DEFAULT 0;";
 
+const char* const kAddZoneOfReport =
+    "ALTER TABLE pending ADD COLUMN zone TEXT NOT NULL DEFAULT '';";
+
 void InsertReport(SqliteDatabase& database, const protocol::Report& report,
                   std::int64_t hold_until_ns) {
   SqliteStatement insert = database.Prepare(
       "INSERT INTO pending(uuid,drive_id,stamp_ns,class_name,confidence,x_min,y_min,x_max,y_max,"
       "latitude,longitude,variance_east,covariance_east_north,variance_north,"
       "image_width,image_height,image_frame_id,image_format,image,"
-      "shown_x,shown_y,shown_width,shown_height,hold_until_ns)"
-      " VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
+      "shown_x,shown_y,shown_width,shown_height,hold_until_ns,zone)"
+      " VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
   insert.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
       .Bind(2, report.drive_id)
       .Bind(3, report.stamp_ns)
@@ -92,6 +96,7 @@ void InsertReport(SqliteDatabase& database, const protocol::Report& report,
       .Bind(22, static_cast<std::int64_t>(report.shown.width))
       .Bind(23, static_cast<std::int64_t>(report.shown.height))
       .Bind(24, hold_until_ns)
+      .Bind(25, report.zone)
       .Execute();
 }
 

@@ -14,6 +14,8 @@ extern const char* const kCreateReportTable;
 /// SQL that gives the table of an older LiveMap what a picture shows (the whole image) and until
 /// when a report is held (it is not).
 extern const char* const kAddShownRegionAndHold;
+/// SQL that gives the table of an older LiveMap the zone of each report: empty, whichever it was.
+extern const char* const kAddZoneOfReport;
 
 /// `hold_until_ns`: UTC by the vehicle's clock; 0: the report may go at once.
 void InsertReport(SqliteDatabase& database, const protocol::Report& report,

@@ -31,20 +31,15 @@ constexpr char kBrokenZone[] =
     "NOT (typeof(map_sequence) = 'integer' AND "
     "map_sequence BETWEEN 0 AND 1152921504606846975)";
 
+std::string BrokenOr(const std::string& broken, const std::string& valid) {
+  return broken + " OR NOT (" + valid + ")";
+}
+
 std::size_t CountInvalidRows(SqliteDatabase& database, const std::string& table,
                              const std::string& which) {
   SqliteStatement query = database.Prepare("SELECT count(*) FROM " + table + " WHERE " + which);
   query.Step();
   return static_cast<std::size_t>(query.Int(0));
-}
-
-/// One row of `zone`, whatever there was: knowing nothing, the vehicle is told everything.
-std::size_t MendZoneRows(SqliteDatabase& database) {
-  if (CountInvalidRows(database, "zone", kBrokenZone) == 0 &&
-      CountInvalidRows(database, "zone", "1") == 1)
-    return 0;
-  database.Execute("DELETE FROM zone; INSERT INTO zone(map_sequence) VALUES(0)");
-  return 1;
 }
 
 std::size_t TakeOutInvalidRows(SqliteDatabase& database, const std::string& table,
@@ -62,6 +57,10 @@ bool IsCovarianceOfReport(const Eigen::Matrix2d& covariance_m2) {
          covariance_m2.cwiseAbs().maxCoeff() <= kMaxVarianceM2 && covariance_m2.determinant() > 0;
 }
 
+const char* const kZoneColumnIsValid =
+    "typeof(zone) = 'text' AND length(CAST(zone AS BLOB)) <= 64 AND "
+    "zone NOT GLOB '*[^A-Za-z0-9._-]*'";
+
 const char* const kFetchableReport =
     "typeof(uuid) = 'blob' AND length(uuid) = 16 AND uuid <> zeroblob(16) AND "
     "length(CAST(drive_id AS BLOB)) <= 64 AND length(CAST(class_name AS BLOB)) <= 64 AND "
@@ -76,7 +75,9 @@ const char* const kFetchableReport =
     "image_width BETWEEN 0 AND 4294967295 AND image_height BETWEEN 0 AND 4294967295 AND "
     "shown_x BETWEEN 0 AND 4294967295 AND shown_y BETWEEN 0 AND 4294967295 AND "
     "shown_width BETWEEN 0 AND 4294967295 AND shown_height BETWEEN 0 AND 4294967295 AND "
-    "typeof(hold_until_ns) = 'integer'";
+    "typeof(hold_until_ns) = 'integer' AND "
+    "typeof(zone) = 'text' AND length(CAST(zone AS BLOB)) <= 64 AND "
+    "zone NOT GLOB '*[^A-Za-z0-9._-]*'";
 
 bool IsSound(const protocol::Report& report) {
   const imaging::Box& box = report.box;
@@ -100,8 +101,11 @@ void DropInvalidPicture(protocol::Report& report) {
 InvalidRows RepairTables(SqliteDatabase& database) {
   InvalidRows broken;
   database.Transaction([&] {
-    broken.known = TakeOutInvalidRows(database, "known", kBrokenKnown) +
-                   TakeOutInvalidRows(database, "gone", kBrokenGone) + MendZoneRows(database);
+    // Of a zone that is taken out the vehicle knows nothing: so it is told everything.
+    broken.known =
+        TakeOutInvalidRows(database, "known", BrokenOr(kBrokenKnown, kZoneColumnIsValid)) +
+        TakeOutInvalidRows(database, "gone", BrokenOr(kBrokenGone, kZoneColumnIsValid)) +
+        TakeOutInvalidRows(database, "zones", BrokenOr(kBrokenZone, kZoneColumnIsValid));
   });
   broken.reports =
       CountInvalidRows(database, "pending", std::string("NOT (") + kFetchableReport + ")");

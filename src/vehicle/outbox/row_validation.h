@@ -36,6 +36,8 @@ struct InvalidRows {
 /// fills again what the program cannot have written. Throws StoreError.
 InvalidRows RepairTables(SqliteDatabase& database);
 
+/// SQL's condition for a column `zone` that holds a zone's id, or nothing.
+extern const char* const kZoneColumnIsValid;
 /// SQL's condition for a row of `pending` whose values have types and sizes that can be fetched.
 extern const char* const kFetchableReport;
 

@@ -309,6 +309,7 @@ void PollResponder::Answer(OpenPoll& open) {
   protocol::PollAnswer reply;
   reply.poll = open.poll.poll;
   reply.hazard = open.poll.hazard;
+  reply.zone = open.poll.zone;
   reply.drive_id = config_.drive_id;
   // The picture's stamp and place are the answer's.
   const bool decided = seen || not_there || (open.pictures && !open.pictures->empty());

@@ -482,6 +482,7 @@ protocol::Report HazardReporter::MakeReport(WaitingFrame& waiting, std::size_t i
   report.image_width = waiting.frame.image_width;
   report.image_height = waiting.frame.image_height;
   report.image_frame_id = waiting.frame.frame_id;
+  if (zone_of_) report.zone = zone_of_(report.position);
   AttachPicture(waiting, index, report);
   return report;
 }

@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "geo/ground_projection.h"
@@ -178,6 +180,11 @@ class HazardReporter {
   std::vector<PictureOrder> TakePictureOrders();
   /// The answer to an order: one picture for each cut, or nothing where none may leave the vehicle.
   void AddPictures(std::uint64_t order, std::vector<imaging::CroppedPicture> pictures);
+  /// How to find the id of the zone in which a hazard lies, for its report; an empty id stands for
+  /// the configured zone, as it does for all hazards while nothing is set.
+  void SetZoneLookup(std::function<std::string(const geo::GeoPoint&)> zone_of) {
+    zone_of_ = std::move(zone_of);
+  }
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const protocol::Notice& notice);
   void AddReceipt(const protocol::Receipt& receipt);
@@ -246,6 +253,7 @@ class HazardReporter {
   protocol::HazardCatalogue catalogue_;
   std::mt19937_64 random_;
   LocalHazardMap map_;
+  std::function<std::string(const geo::GeoPoint&)> zone_of_;
   VehiclePoseLookup vehicle_poses_;
   ResendSchedule schedule_;
   std::optional<geo::CameraIntrinsics> intrinsics_;

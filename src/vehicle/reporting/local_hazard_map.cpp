@@ -29,13 +29,28 @@ const std::vector<std::string>& LocalHazardMapMigrations() {
       "CREATE INDEX gone_by_sequence ON gone(sequence);"
       "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
       "INSERT INTO zone(map_sequence) VALUES(0);",
-      kAddShownRegionAndHold};
+      kAddShownRegionAndHold,
+      // Every zone counts for itself. GiveRowsTheirZone names the zone of what is there already.
+      std::string("ALTER TABLE known ADD COLUMN zone TEXT NOT NULL DEFAULT '';"
+                  "CREATE TABLE gone_of_zones(zone TEXT NOT NULL, id BLOB NOT NULL,"
+                  "  sequence INTEGER NOT NULL, PRIMARY KEY(zone, id)) WITHOUT ROWID;"
+                  "INSERT INTO gone_of_zones(zone,id,sequence) SELECT '',id,sequence FROM gone;"
+                  "DROP TABLE gone;"
+                  "ALTER TABLE gone_of_zones RENAME TO gone;"
+                  "CREATE INDEX gone_by_sequence ON gone(zone, sequence);"
+                  "CREATE TABLE zones(zone TEXT PRIMARY KEY NOT NULL,"
+                  "  map_sequence INTEGER NOT NULL) WITHOUT ROWID;"
+                  "INSERT OR IGNORE INTO zones(zone,map_sequence) SELECT '',map_sequence FROM zone;"
+                  "DROP TABLE zone;") +
+          kAddZoneOfReport};
   return migrations;
 }
 
 constexpr int kGoneKept = 10000;
 /// Told hazards between two kCaughtUp; the zone tells fewer.
 constexpr std::size_t kMaxTold = 200000;
+/// Zones of which anything is remembered; a zone directory has no more.
+constexpr std::size_t kMaxZones = 5000;
 
 bool IsUsableNotice(const protocol::Notice& notice) {
   if (notice.sequence > std::numeric_limits<std::int64_t>::max()) return false;
@@ -56,21 +71,42 @@ LocalHazardMap::LocalHazardMap(const Config& config, const protocol::HazardCatal
     : config_(config), catalogue_(catalogue), filter_(catalogue) {
   set_aside_ =
       OpenOrQuarantine(config_.path, LocalHazardMapMigrations(), now_ns, database_, [this] {
+        GiveRowsTheirZone();
         broken_rows_ = RepairTables(*database_);
         LoadFilter();
       });
   if (!set_aside_.empty()) RecoverFromSetAside();
 }
 
+/// The zone of what names the zone `named`, or none.
+std::string LocalHazardMap::ZoneOf(const std::string& named) const {
+  if (config_.zone.empty()) return "";
+  return named.empty() ? config_.zone : named;
+}
+
+void LocalHazardMap::GiveRowsTheirZone() {
+  if (config_.zone.empty()) return;
+  database_->Transaction([&] {
+    for (const char* table : {"known", "pending", "gone", "zones"}) {
+      // Where the zone has a row of its own, that is the newer one.
+      database_->Prepare(std::string("UPDATE OR IGNORE ") + table + " SET zone=? WHERE zone=''")
+          .Bind(1, config_.zone)
+          .Execute();
+    }
+    database_->Execute("DELETE FROM gone WHERE zone=''; DELETE FROM zones WHERE zone='';");
+  });
+}
+
 void LocalHazardMap::RecoverFromSetAside() {
   // So that the first page of the new file is in the file itself.
   database_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Execute();
   salvage_ = SalvageReports(set_aside_, config_.path, [this](const StoredReport& stored) {
-    const protocol::Report& report = stored.report;
+    protocol::Report report = stored.report;
     if (LoadPending(report.uuid)) return;
+    report.zone = ZoneOf(report.zone);
     database_->Transaction([&] {
       InsertReport(*database_, report, stored.hold_until_ns);
-      if (!filter_.Find(report.class_name, report.position)) InsertKnown(report);
+      if (!filter_.Find(report.class_name, report.position)) InsertKnown(report, report.zone);
     });
     if (stored.sent) MarkSent(report.uuid);
   });
@@ -83,8 +119,11 @@ void LocalHazardMap::LoadFilter() {
   while (rows.Step()) {
     filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), {rows.Real(2), rows.Real(3)});
   }
-  SqliteStatement zone = database_->Prepare("SELECT map_sequence FROM zone");
-  if (zone.Step()) chain_ = NoticeSequenceTracker(static_cast<std::uint64_t>(zone.Int(0)));
+  zones_.clear();
+  SqliteStatement zones = database_->Prepare("SELECT zone,map_sequence FROM zones");
+  while (zones.Step() && zones_.size() < kMaxZones) {
+    zones_[zones.Text(0)].chain = NoticeSequenceTracker(static_cast<std::uint64_t>(zones.Int(1)));
+  }
   CountPending();
 }
 
@@ -114,9 +153,11 @@ LocalHazardMap::AddResult LocalHazardMap::Add(const protocol::Report& report,
     return AddResult::kFull;
   }
   std::vector<Change> changes = {{report.uuid, true, report.class_name, report.position}};
+  protocol::Report stored = report;
+  stored.zone = ZoneOf(report.zone);
   database_->Transaction([&] {
-    InsertKnown(report);
-    InsertReport(*database_, report, hold_until_ns);
+    InsertKnown(stored, stored.zone);
+    InsertReport(*database_, stored, hold_until_ns);
     EvictBeyondLimit(changes);
   });
   Show(changes);
@@ -125,16 +166,17 @@ LocalHazardMap::AddResult LocalHazardMap::Add(const protocol::Report& report,
   return AddResult::kAdded;
 }
 
-void LocalHazardMap::InsertKnown(const protocol::Report& report) {
+void LocalHazardMap::InsertKnown(const protocol::Report& report, const std::string& zone) {
   SqliteStatement known = database_->Prepare(
-      "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
-      " VALUES(?,0,?,?,?,?,0,?)");
+      "INSERT INTO known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone)"
+      " VALUES(?,0,?,?,?,?,0,?,?)");
   known.BindBlob(1, report.uuid.bytes.data(), report.uuid.bytes.size())
       .Bind(2, report.class_name)
       .Bind(3, static_cast<double>(report.confidence))
       .Bind(4, report.position.latitude_deg)
       .Bind(5, report.position.longitude_deg)
       .Bind(6, report.stamp_ns)
+      .Bind(7, zone)
       .Execute();
 }
 
@@ -191,7 +233,7 @@ std::size_t LocalHazardMap::ForgetUnannounced(std::int64_t now_ns) {
 
 bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   const auto report = LoadPending(receipt.report_uuid);
-  if (!report) return false;
+  if (!report || report->zone != ZoneOf(receipt.zone)) return false;
   const auto& own_id = receipt.report_uuid.bytes;
   const auto& zone_id = receipt.hazard_uuid.bytes;
   const bool renames = receipt.status == protocol::Receipt::Status::kCommitted &&
@@ -250,7 +292,7 @@ void LocalHazardMap::MarkSent(const Uuid& uuid) {
 
 std::vector<KnownHazard> LocalHazardMap::Known(std::size_t limit) const {
   SqliteStatement rows = database_->Prepare(
-      "SELECT id,of_zone,class_name,confidence,latitude,longitude FROM known"
+      "SELECT id,of_zone,class_name,confidence,latitude,longitude,zone FROM known"
       " ORDER BY news_ns DESC LIMIT ?");
   rows.Bind(1, static_cast<std::int64_t>(limit));
   std::vector<KnownHazard> known;
@@ -259,74 +301,104 @@ std::vector<KnownHazard> LocalHazardMap::Known(std::size_t limit) const {
                      rows.Int(1) != 0,
                      rows.Text(2),
                      static_cast<float>(rows.Real(3)),
-                     {rows.Real(4), rows.Real(5)}});
+                     {rows.Real(4), rows.Real(5)},
+                     rows.Text(6)});
   }
   return known;
 }
 
+std::uint64_t LocalHazardMap::map_sequence(const std::string& zone) const {
+  const auto found = zones_.find(ZoneOf(zone));
+  return found == zones_.end() ? 0 : found->second.chain.known();
+}
+
+bool LocalHazardMap::has_gap() const {
+  return std::any_of(zones_.begin(), zones_.end(),
+                     [](const auto& zone) { return zone.second.chain.has_gap(); });
+}
+
 std::size_t LocalHazardMap::Apply(const std::vector<protocol::Notice>& notices) {
   std::vector<Change> changes;
-  NoticeSequenceTracker chain = chain_;
-  std::set<Uuid> told = told_;
+  std::map<std::string, ZoneMemory> zones;  // Those that say something here, as they become.
   std::size_t unusable = 0;
   database_->Transaction([&] {
     for (const protocol::Notice& notice : notices) {
-      if (!IsUsableNotice(notice)) {
-        ++unusable;
-        continue;
-      }
-      if (notice.action == protocol::Notice::Action::kCaughtUp) {
-        if (!CatchUp(notice, told, chain, changes)) ++unusable;
-        told.clear();
-        continue;
-      }
-      if (notice.vehicle_id.empty()) {
-        chain.Add(notice.previous_sequence, notice.sequence);
-      } else if (told.size() < kMaxTold) {
-        told.insert(notice.hazard_uuid);
-      }
-      if (!IsNews(notice)) continue;
-      StoreNotice(notice);
-      changes.push_back({notice.hazard_uuid, notice.action != protocol::Notice::Action::kRemoved,
-                         notice.class_name, notice.position});
+      const std::string zone = ZoneOf(notice.zone);
+      ZoneMemory* memory = Remember(zone, zones);
+      if (memory == nullptr || !ApplyNotice(notice, zone, *memory, changes)) ++unusable;
     }
-    if (chain.known() != chain_.known()) {
-      database_->Prepare("UPDATE zone SET map_sequence=?")
-          .Bind(1, static_cast<std::int64_t>(chain.known()))
+    for (const auto& [zone, memory] : zones) {
+      if (memory.chain.known() == map_sequence(zone)) continue;
+      database_->Prepare("INSERT OR REPLACE INTO zones(zone,map_sequence) VALUES(?,?)")
+          .Bind(1, zone)
+          .Bind(2, static_cast<std::int64_t>(memory.chain.known()))
           .Execute();
     }
     EvictBeyondLimit(changes);
   });
   Show(changes);
-  chain_ = std::move(chain);
-  told_ = std::move(told);
+  for (auto& [zone, memory] : zones) zones_[zone] = std::move(memory);
   return unusable;
+}
+
+/// The zone's entry in `zones`, at first as it is in zones_; null: too many zones.
+LocalHazardMap::ZoneMemory* LocalHazardMap::Remember(
+    const std::string& zone, std::map<std::string, ZoneMemory>& zones) const {
+  const auto found = zones.find(zone);
+  if (found != zones.end()) return &found->second;
+  const auto before = zones_.find(zone);
+  if (before != zones_.end()) return &zones.emplace(zone, before->second).first->second;
+  if (zones_.size() + zones.size() >= kMaxZones) return nullptr;
+  return &zones[zone];
+}
+
+/// False: it is unusable.
+bool LocalHazardMap::ApplyNotice(const protocol::Notice& notice, const std::string& zone,
+                                 ZoneMemory& memory, std::vector<Change>& changes) {
+  if (!IsUsableNotice(notice)) return false;
+  if (notice.action == protocol::Notice::Action::kCaughtUp) {
+    const bool is_complete = CatchUp(notice, zone, memory, changes);
+    memory.told.clear();
+    return is_complete;
+  }
+  if (IsOfAnotherZone(notice.hazard_uuid, zone)) return false;
+  if (notice.vehicle_id.empty()) {
+    memory.chain.Add(notice.previous_sequence, notice.sequence);
+  } else if (memory.told.size() < kMaxTold) {
+    memory.told.insert(notice.hazard_uuid);
+  }
+  if (!IsNews(notice, zone)) return true;
+  StoreNotice(notice, zone);
+  changes.push_back({notice.hazard_uuid, notice.action != protocol::Notice::Action::kRemoved,
+                     notice.class_name, notice.position});
+  return true;
 }
 
 /// Takes away what the zone no longer has and closes the gap; false when some of what belongs to
 /// this kCaughtUp did not come: then the gap stays open, and the zone tells again.
-bool LocalHazardMap::CatchUp(const protocol::Notice& notice, const std::set<Uuid>& told,
-                             NoticeSequenceTracker& chain, std::vector<Change>& changes) {
+bool LocalHazardMap::CatchUp(const protocol::Notice& notice, const std::string& zone,
+                             ZoneMemory& memory, std::vector<Change>& changes) {
   const bool began_anew = notice.previous_sequence > notice.sequence;
-  if (told.size() < notice.told) return false;
-  if (notice.previous_sequence > chain.known() && !began_anew) return false;
+  if (memory.told.size() < notice.told) return false;
+  if (notice.previous_sequence > memory.chain.known() && !began_anew) return false;
   if (notice.previous_sequence == 0 || began_anew) {
-    for (const Uuid& id : NotTold(notice, told)) Forget(id, changes);
+    for (const Uuid& id : NotTold(notice, zone, memory.told)) Forget(id, changes);
   }
   if (began_anew) {
-    chain = NoticeSequenceTracker(notice.sequence);
+    memory.chain = NoticeSequenceTracker(notice.sequence);
   } else {
-    chain.CloseTo(notice.sequence);
+    memory.chain.CloseTo(notice.sequence);
   }
   return true;
 }
 
 /// Hazards of the zone that a telling of all that is there left out.
-std::vector<Uuid> LocalHazardMap::NotTold(const protocol::Notice& notice,
+std::vector<Uuid> LocalHazardMap::NotTold(const protocol::Notice& notice, const std::string& zone,
                                           const std::set<Uuid>& told) const {
   const bool began_anew = notice.previous_sequence > notice.sequence;
-  SqliteStatement rows =
-      database_->Prepare("SELECT id,latitude,longitude,sequence FROM known WHERE of_zone=1");
+  SqliteStatement rows = database_->Prepare(
+      "SELECT id,latitude,longitude,sequence FROM known WHERE of_zone=1 AND zone=?");
+  rows.Bind(1, zone);
   std::vector<Uuid> left_out;
   while (rows.Step()) {
     const Uuid id = UuidFromBlob(rows.Blob(0));
@@ -341,36 +413,44 @@ std::vector<Uuid> LocalHazardMap::NotTold(const protocol::Notice& notice,
   return left_out;
 }
 
-bool LocalHazardMap::IsNews(const protocol::Notice& notice) const {
+bool LocalHazardMap::IsOfAnotherZone(const Uuid& hazard, const std::string& zone) const {
+  SqliteStatement query = database_->Prepare("SELECT 1 FROM known WHERE id=? AND zone<>?");
+  query.BindBlob(1, hazard.bytes.data(), hazard.bytes.size()).Bind(2, zone);
+  return query.Step();
+}
+
+bool LocalHazardMap::IsNews(const protocol::Notice& notice, const std::string& zone) const {
   SqliteStatement query = database_->Prepare(
       "SELECT max(sequence) FROM (SELECT sequence FROM known WHERE id=?1 AND of_zone=1"
-      " UNION ALL SELECT sequence FROM gone WHERE id=?1)");
-  query.BindBlob(1, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size());
+      " UNION ALL SELECT sequence FROM gone WHERE zone=?2 AND id=?1)");
+  query.BindBlob(1, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size()).Bind(2, zone);
   // No row: 0, and sequences begin at 1.
   return !query.Step() || static_cast<std::int64_t>(notice.sequence) > query.Int(0);
 }
 
-void LocalHazardMap::StoreNotice(const protocol::Notice& notice) {
+void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::string& zone) {
   const auto& id = notice.hazard_uuid.bytes;
   const auto sequence = static_cast<std::int64_t>(notice.sequence);
   if (notice.action == protocol::Notice::Action::kRemoved) {
     database_->Prepare("DELETE FROM known WHERE id=?").BindBlob(1, id.data(), id.size()).Execute();
-    database_->Prepare("INSERT OR REPLACE INTO gone(id,sequence) VALUES(?,?)")
-        .BindBlob(1, id.data(), id.size())
-        .Bind(2, sequence)
+    database_->Prepare("INSERT OR REPLACE INTO gone(zone,id,sequence) VALUES(?,?,?)")
+        .Bind(1, zone)
+        .BindBlob(2, id.data(), id.size())
+        .Bind(3, sequence)
         .Execute();
     database_
         ->Prepare(
-            "DELETE FROM gone WHERE sequence <="
-            " (SELECT sequence FROM gone ORDER BY sequence DESC LIMIT 1 OFFSET ?)")
-        .Bind(1, std::int64_t{kGoneKept})
+            "DELETE FROM gone WHERE zone=?1 AND sequence <= (SELECT sequence FROM gone"
+            " WHERE zone=?1 ORDER BY sequence DESC LIMIT 1 OFFSET ?2)")
+        .Bind(1, zone)
+        .Bind(2, std::int64_t{kGoneKept})
         .Execute();
     return;
   }
   SqliteStatement upsert = database_->Prepare(
       "INSERT OR REPLACE INTO"
-      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns)"
-      " VALUES(?,1,?,?,?,?,?,?)");
+      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone)"
+      " VALUES(?,1,?,?,?,?,?,?,?)");
   upsert.BindBlob(1, id.data(), id.size())
       .Bind(2, notice.class_name)
       .Bind(3, static_cast<double>(notice.confidence))
@@ -378,6 +458,7 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice) {
       .Bind(5, notice.position.longitude_deg)
       .Bind(6, sequence)
       .Bind(7, notice.stamp_ns)
+      .Bind(8, zone)
       .Execute();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -26,18 +27,28 @@ struct KnownHazard {
   std::string class_name;
   float confidence = 0;
   geo::GeoPoint position;
+  std::string zone;  ///< Id of the zone in which it lies.
 };
 
-/// The vehicle's memory: the hazards it knows, its own and those that the zone announced, up to
-/// which of the zone's announcements it knows all, and its reports that the zone has not answered
-/// yet (the outbox). All stand in one durable SQLite database, so that "known" and "to be sent" are
-/// one transaction: what Add accepted is reported whatever dies.
+/// The vehicle's memory: the hazards it knows, its own and those that the zones announced, up to
+/// which of each zone's announcements it knows all, and its reports that their zone has not
+/// answered yet (the outbox). All stand in one durable SQLite database, so that "known" and "to be
+/// sent" are one transaction: what Add accepted is reported whatever dies.
+///
+/// A vehicle that changes zones knows hazards of several. Each zone counts its announcements for
+/// itself, so every hazard, report and sequence here belongs to one zone, and no zone's word
+/// touches what belongs to another one. Where a report, notice or receipt names no zone, it is of
+/// the configured one.
+///
 /// Not thread-safe. Every method that writes throws StoreError when the store fails; then nothing
 /// has changed.
 class LocalHazardMap {
  public:
   struct Config {
     std::string path;  ///< The database file; its directory exists.
+    /// Id of the configured zone, to which all belongs that names none, rows of an older LiveMap
+    /// included. Empty: there is one zone only, whatever its id.
+    std::string zone;
     /// Hazards kept; beyond it the ones longest without news are forgotten (and would be reported
     /// anew), never one whose report is unfinished.
     int max_known = 100000;
@@ -83,15 +94,20 @@ class LocalHazardMap {
   /// it may wait for a cheap link; 0: not at all.
   AddResult Add(const protocol::Report& report, std::int64_t hold_until_ns = 0);
 
-  /// Takes in what the zone announced, in one transaction. Returns how many were unusable (nil id,
-  /// impossible position, overlong class name) and left out. A kCaughtUp takes away what the zone
-  /// no longer has; one that came without all that belongs to it counts as unusable.
+  /// Takes in what zones announced, in one transaction. Returns how many were unusable (nil id,
+  /// impossible position, overlong class name, a hazard of another zone) and left out. A kCaughtUp
+  /// takes away what its zone no longer has; one that came without all that belongs to it counts as
+  /// unusable.
   std::size_t Apply(const std::vector<protocol::Notice>& notices);
-  /// Up to which announcement of the zone this vehicle knows all; 0: none. Survives a restart.
-  std::uint64_t map_sequence() const { return chain_.known(); }
-  /// Announcements came ahead of one that is missing.
-  bool has_gap() const { return chain_.has_gap(); }
-  /// Ends the report that the receipt answers; false when no such report is unfinished. A committed
+  /// Up to which announcement of the zone with this id the vehicle knows all; 0: none. An empty id
+  /// is the configured zone's. Survives a restart.
+  std::uint64_t map_sequence(const std::string& zone = "") const;
+  /// Announcements of some zone came ahead of one that is missing.
+  bool has_gap() const;
+  /// How many zones have announced anything.
+  std::size_t zone_count() const { return zones_.size(); }
+  /// Ends the report that the receipt answers; false when no such report is unfinished, or when
+  /// another zone than the report's answers. A committed
   /// hazard goes on under the zone's id. A refused one stays known, or it would be reported anew
   /// at the next sight.
   bool Apply(const protocol::Receipt& receipt);
@@ -114,6 +130,12 @@ class LocalHazardMap {
   std::size_t pending_bytes() const { return pending_bytes_; }
 
  private:
+  /// What one zone has announced so far.
+  struct ZoneMemory {
+    NoticeSequenceTracker chain;
+    std::set<Uuid> told;  // To this vehicle alone, since the last kCaughtUp.
+  };
+
   /// What a transaction did to `known`, for the filter after its commit.
   struct Change {
     Uuid id;
@@ -122,15 +144,22 @@ class LocalHazardMap {
     geo::GeoPoint position;
   };
 
+  std::string ZoneOf(const std::string& named) const;
+  void GiveRowsTheirZone();
   void RecoverFromSetAside();
   void LoadFilter();
   void CountPending();
-  void InsertKnown(const protocol::Report& report);
-  bool IsNews(const protocol::Notice& notice) const;
-  void StoreNotice(const protocol::Notice& notice);
-  bool CatchUp(const protocol::Notice& notice, const std::set<Uuid>& told,
-               NoticeSequenceTracker& chain, std::vector<Change>& changes);
-  std::vector<Uuid> NotTold(const protocol::Notice& notice, const std::set<Uuid>& told) const;
+  void InsertKnown(const protocol::Report& report, const std::string& zone);
+  ZoneMemory* Remember(const std::string& zone, std::map<std::string, ZoneMemory>& zones) const;
+  bool ApplyNotice(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
+                   std::vector<Change>& changes);
+  bool IsOfAnotherZone(const Uuid& hazard, const std::string& zone) const;
+  bool IsNews(const protocol::Notice& notice, const std::string& zone) const;
+  void StoreNotice(const protocol::Notice& notice, const std::string& zone);
+  bool CatchUp(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
+               std::vector<Change>& changes);
+  std::vector<Uuid> NotTold(const protocol::Notice& notice, const std::string& zone,
+                            const std::set<Uuid>& told) const;
   void Forget(const Uuid& id, std::vector<Change>& changes);
   void EvictBeyondLimit(std::vector<Change>& changes);
   void Show(const std::vector<Change>& changes);
@@ -142,8 +171,7 @@ class LocalHazardMap {
   InvalidRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
   DuplicateFilter filter_;
-  NoticeSequenceTracker chain_;
-  std::set<Uuid> told_;  // To this vehicle alone, since the last kCaughtUp.
+  std::map<std::string, ZoneMemory> zones_;  // By id.
   std::size_t pending_count_ = 0;
   std::size_t pending_bytes_ = 0;
 };

@@ -17,12 +17,16 @@ VehicleAllowance::Config AllowanceOf(const ZoneConfig& config) {
 }
 
 protocol::Receipt Kept(const protocol::MapChangeReport& report, const Uuid& feature) {
-  return {protocol::Receipt::Status::kCommitted, report.uuid, feature, report.vehicle_id, ""};
+  return {protocol::Receipt::Status::kCommitted, report.uuid, feature, report.vehicle_id, "", ""};
 }
 
 protocol::Receipt Rejected(const protocol::MapChangeReport& report, std::string sentence) {
-  return {protocol::Receipt::Status::kRefused, report.uuid, Uuid{}, report.vehicle_id,
-          std::move(sentence)};
+  return {protocol::Receipt::Status::kRefused,
+          report.uuid,
+          Uuid{},
+          report.vehicle_id,
+          std::move(sentence),
+          ""};
 }
 
 std::uint64_t& CountOf(MapChangeRegistry::Outcome outcome, MapChangeStatistics& counted) {

@@ -11,7 +11,8 @@ namespace livemap::zone {
 namespace {
 
 protocol::Receipt Committed(const protocol::Report& report, const Uuid& hazard_uuid) {
-  return {protocol::Receipt::Status::kCommitted, report.uuid, hazard_uuid, report.vehicle_id, ""};
+  return {
+      protocol::Receipt::Status::kCommitted, report.uuid, hazard_uuid, report.vehicle_id, "", ""};
 }
 
 }  // namespace
@@ -104,8 +105,12 @@ bool ReportIntake::MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& b
 
 void ReportIntake::Refuse(const Refusal& refusal, std::size_t index, Batch& batch) {
   const protocol::Report& report = (*batch.reports)[index];
-  batch.receipts[index] = {protocol::Receipt::Status::kRefused, report.uuid, Uuid{},
-                           report.vehicle_id, refusal.sentence};
+  batch.receipts[index] = {protocol::Receipt::Status::kRefused,
+                           report.uuid,
+                           Uuid{},
+                           report.vehicle_id,
+                           refusal.sentence,
+                           ""};
   ++batch.counted.refused;
   ++batch.counted.refused_by_kind[static_cast<std::size_t>(refusal.kind)];
 }

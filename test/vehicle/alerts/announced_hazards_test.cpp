@@ -32,7 +32,7 @@ protocol::Notice NoticeOf(std::uint8_t number, Action action, std::uint64_t sequ
 }
 
 StoredHazards::Row RowOf(std::uint8_t number, std::uint64_t sequence) {
-  return {{IdOf(number), "pothole", {49.2, 7.0}, 0, std::nullopt}, sequence};
+  return {{IdOf(number), "pothole", {49.2, 7.0}, 0, std::nullopt}, sequence, ""};
 }
 
 TEST(AnnouncedHazardsTest, ANoticeAddsMovesAndTakesAway) {
@@ -62,10 +62,10 @@ TEST(AnnouncedHazardsTest, WhatCannotBeIsLeftOut) {
 
 TEST(AnnouncedHazardsTest, TheMapBringsWhatWasBeforeAndTakesWhatItNoLongerHas) {
   AnnouncedHazards hazards;
-  EXPECT_EQ(hazards.Apply(StoredHazards{{RowOf(1, 5), RowOf(2, 6)}, 6}).put.size(), 2U);
+  EXPECT_EQ(hazards.Apply(StoredHazards{{RowOf(1, 5), RowOf(2, 6)}, {{"", 6}}}).put.size(), 2U);
   hazards.Apply(NoticeOf(3, Action::kAdded, 7));
   hazards.Apply(NoticeOf(2, Action::kRemoved, 8));
-  const auto changes = hazards.Apply(StoredHazards{{RowOf(2, 6)}, 6});
+  const auto changes = hazards.Apply(StoredHazards{{RowOf(2, 6)}, {{"", 6}}});
   EXPECT_TRUE(changes.put.empty()) << "the notice of its removal is newer than the map";
   EXPECT_EQ(changes.gone, std::vector<Uuid>{IdOf(1)});
   EXPECT_EQ(hazards.size(), 1U) << "the third is newer than the map";
@@ -73,10 +73,33 @@ TEST(AnnouncedHazardsTest, TheMapBringsWhatWasBeforeAndTakesWhatItNoLongerHas) {
 
 TEST(AnnouncedHazardsTest, AZoneThatBeganAnewCountsAnew) {
   AnnouncedHazards hazards;
-  hazards.Apply(StoredHazards{{RowOf(1, 500), RowOf(2, 600)}, 600});
-  const auto changes = hazards.Apply(StoredHazards{{RowOf(3, 1)}, 1});
+  hazards.Apply(StoredHazards{{RowOf(1, 500), RowOf(2, 600)}, {{"", 600}}});
+  const auto changes = hazards.Apply(StoredHazards{{RowOf(3, 1)}, {{"", 1}}});
   EXPECT_EQ(changes.put.size(), 1U);
   EXPECT_EQ(changes.gone, (std::vector<Uuid>{IdOf(1), IdOf(2)}));
+}
+
+TEST(AnnouncedHazardsTest, EachZonesWordCountsForItsOwnHazards) {
+  AnnouncedHazards hazards;
+  protocol::Notice west = NoticeOf(1, Action::kAdded, 500);
+  west.zone = "west";
+  protocol::Notice east = NoticeOf(2, Action::kAdded, 3);
+  east.zone = "east";
+  hazards.Apply(west);
+  hazards.Apply(east);
+  protocol::Notice foreign = NoticeOf(1, Action::kRemoved, 501);
+  foreign.zone = "east";
+  EXPECT_TRUE(hazards.Apply(foreign).gone.empty());
+  // The map has taken in all of west's announcements and none of east's yet.
+  EXPECT_EQ(hazards.Apply(StoredHazards{{}, {{"west", 500}}}).gone, std::vector<Uuid>{IdOf(1)});
+  EXPECT_EQ(hazards.size(), 1U);
+  // East begins to count anew; west does not.
+  StoredHazards::Row row = RowOf(1, 501);
+  row.zone = "west";
+  hazards.Apply(StoredHazards{{row}, {{"east", 9}, {"west", 501}}});
+  const auto changes = hazards.Apply(StoredHazards{{row}, {{"east", 1}, {"west", 501}}});
+  EXPECT_TRUE(changes.gone.empty());
+  EXPECT_EQ(hazards.size(), 1U);
 }
 
 TEST(AnnouncedHazardsTest, ReadsTheLocalMapWhileItIsOpen) {
@@ -98,7 +121,7 @@ TEST(AnnouncedHazardsTest, ReadsTheLocalMapWhileItIsOpen) {
   ASSERT_EQ(stored->rows.size(), 1U);
   EXPECT_EQ(stored->rows[0].hazard.id, IdOf(1));
   EXPECT_EQ(stored->rows[0].sequence, 1U);
-  EXPECT_EQ(stored->sequence, 3U);
+  EXPECT_EQ(stored->sequences, (std::map<std::string, std::uint64_t>{{"", 3}}));
 }
 
 }  // namespace

@@ -101,6 +101,40 @@ TEST_F(MapChangeOutboxTest, AnAnswerToAnotherReportEndsNothing) {
   EXPECT_EQ(outbox_->counters().committed, 0U);
 }
 
+TEST_F(MapChangeOutboxTest, OnlyTheZoneInWhichTheObjectLiesEndsItsReport) {
+  config_.zone = "west";
+  Restart();
+  protocol::MapChangeReport in_east = SignGone(1);
+  in_east.zone = "east";
+  outbox_->Add(in_east, 0);
+  outbox_->Add(SignGone(2), 0);
+  Restart();
+  const auto due = outbox_->TakeDue(0, 10);
+  ASSERT_THAT(due, SizeIs(2));
+  EXPECT_EQ(due[0].zone, "east");
+  EXPECT_EQ(due[1].zone, "west") << "which is configured";
+  protocol::Receipt receipt = Committed(in_east);
+  receipt.zone = "west";
+  outbox_->AddReceipt(receipt);
+  EXPECT_EQ(outbox_->pending(), 2U);
+  receipt.zone = "east";
+  outbox_->AddReceipt(receipt);
+  outbox_->AddReceipt(Committed(SignGone(2)));
+  EXPECT_EQ(outbox_->pending(), 0U);
+}
+
+TEST_F(MapChangeOutboxTest, RowsOfAnOlderProgramBelongToTheConfiguredZone) {
+  outbox_->Add(SignGone(1), 0);
+  outbox_.reset();
+  SqliteDatabase(config_.path, true)
+      .Execute("ALTER TABLE pending DROP COLUMN zone; PRAGMA user_version=1");
+  config_.zone = "west";
+  Restart();
+  const auto due = outbox_->TakeDue(0, 10);
+  ASSERT_THAT(due, SizeIs(1));
+  EXPECT_EQ(due[0].zone, "west");
+}
+
 TEST_F(MapChangeOutboxTest, WhenFullTheOldestGoesAndIsCounted) {
   config_.most = 2;
   Restart();

@@ -76,13 +76,14 @@ TEST_F(BrokenRowsTest, AKnownHazardOfImpossibleValuesIsTakenOutAndTheOthersStay)
   for (const char* broken :
        {"latitude = 91", "longitude = -9e999", "latitude = 'x'", "confidence = 2",
         "class_name = ''", "class_name = printf('%100s', 'x')", "sequence = -1",
-        "sequence = 9223372036854775807", "news_ns = -1", "of_zone = 7", "id = x'00'"}) {
+        "sequence = 9223372036854775807", "news_ns = -1", "of_zone = 7", "id = x'00'",
+        "zone = 'a/b'", "zone = x'00'"}) {
     Write(std::string("UPDATE known SET ") + broken + " WHERE id = " + Where(12));
     LocalHazardMap map = Open();
     EXPECT_EQ(map.broken_rows().known, 1U) << broken;
     EXPECT_EQ(map.known_count(), 4U) << broken;
     EXPECT_EQ(map.Known(100).size(), 4U) << broken;
-    Write("UPDATE zone SET map_sequence = 11");
+    Write("UPDATE zones SET map_sequence = 11");
     map.Apply({MakeNotice(12)});
     EXPECT_EQ(map.known_count(), 5U) << broken << ": told again it is known again";
   }
@@ -92,7 +93,7 @@ TEST_F(BrokenRowsTest, AReportOfImpossibleValuesIsLeftThereAndNotSentAndTheOther
   for (const char* broken :
        {"latitude = 91", "variance_east = 9e999", "variance_north = -1", "confidence = 'x'",
         "stamp_ns = -1", "stamp_ns = 9223372036854775807", "x_min = 9e999", "class_name = ''",
-        "drive_id = printf('%100s', 'x')", "image = zeroblob(20000000)"}) {
+        "drive_id = printf('%100s', 'x')", "image = zeroblob(20000000)", "zone = '#'"}) {
     SCOPED_TRACE(broken);
     std::filesystem::remove(config_.path + ".before");
     std::filesystem::copy_file(config_.path, config_.path + ".before");
@@ -114,7 +115,7 @@ TEST_F(BrokenRowsTest, AReportOfImpossibleValuesIsLeftThereAndNotSentAndTheOther
     database.Execute(
         "UPDATE pending SET latitude=42, variance_east=1, variance_north=1, "
         "confidence=0.5, stamp_ns=1700000000000000000, x_min=1, class_name='cone', "
-        "drive_id='', image=x''");
+        "drive_id='', image=x'', zone=''");
   }
 }
 
@@ -131,9 +132,9 @@ TEST_F(BrokenRowsTest, AReportWithoutAUuidKeepsNothingFromBeingForgotten) {
 
 TEST_F(BrokenRowsTest, AnImpossibleSequenceMeansThatNothingIsKnown) {
   for (const char* sql :
-       {"UPDATE zone SET map_sequence = -5", "UPDATE zone SET map_sequence = 9223372036854775807",
-        "UPDATE zone SET map_sequence = 'x'", "DELETE FROM zone",
-        "INSERT INTO zone VALUES (1), (2)"}) {
+       {"UPDATE zones SET map_sequence = -5", "REPLACE INTO zones VALUES ('', 9223372036854775807)",
+        "REPLACE INTO zones VALUES ('', 'x')", "REPLACE INTO zones VALUES ('a/b', 5)",
+        "REPLACE INTO zones VALUES (printf('%65s', 'a'), 5)"}) {
     Write(sql);
     LocalHazardMap map = Open();
     EXPECT_EQ(map.broken_rows().known, 1U) << sql;

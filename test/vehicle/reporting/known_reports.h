@@ -59,15 +59,23 @@ inline protocol::Notice MakeNotice(protocol::Notice::Action action, int hazard,
   return notice;
 }
 
-/// Gives an outbox the shape that it had before pictures showed a part of the image and reports
-/// were held.
+/// Gives an outbox the shape that it had before pictures showed a part of the image, reports were
+/// held, and there were several zones.
 inline void MakeOlder(const std::string& path) {
   SqliteDatabase database(path, /*durable=*/true);
   for (const char* column :
        {"shown_x", "shown_y", "shown_width", "shown_height", "hold_until_ns"}) {
     database.Execute(std::string("ALTER TABLE pending DROP COLUMN ") + column);
   }
-  database.Execute("PRAGMA user_version=2");
+  database.Execute(
+      "ALTER TABLE pending DROP COLUMN zone; ALTER TABLE known DROP COLUMN zone;"
+      "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
+      "INSERT INTO zone SELECT coalesce(max(map_sequence), 0) FROM zones; DROP TABLE zones;"
+      "ALTER TABLE gone RENAME TO gone_of_zones;"
+      "CREATE TABLE gone(id BLOB PRIMARY KEY, sequence INTEGER NOT NULL) WITHOUT ROWID;"
+      "INSERT INTO gone SELECT id,sequence FROM gone_of_zones; DROP TABLE gone_of_zones;"
+      "CREATE INDEX gone_by_sequence ON gone(sequence);"
+      "PRAGMA user_version=2");
 }
 
 }  // namespace livemap::vehicle
