@@ -81,6 +81,11 @@ void CheckMqttOptions(const MqttConfig& options) {
                     "max_inflight", std::to_string(options.max_inflight), "1 to 65535");
   RequireMqttOption(options.max_packet_bytes > 0, "max_packet_bytes",
                     std::to_string(options.max_packet_bytes), "above 0");
+  for (const MqttAddress& fallback : options.fallbacks) {
+    RequireMqttOption(!fallback.host.empty(), "host", fallback.host, "a host name or an address");
+    RequireMqttOption(fallback.port > 0 && fallback.port <= 65535, "port",
+                      std::to_string(fallback.port), "1 to 65535");
+  }
   if (options.tls) CheckMosquittoTlsOptions(*options.tls);
 }
 
@@ -105,9 +110,10 @@ MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data) 
   return handle;
 }
 
-int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const std::string& address) {
+int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const MqttAddress& broker,
+                     const std::string& numeric_address) {
   // The certificate is checked against the name that was asked for, so TLS resolves it again.
-  const std::string& host = options.tls ? options.host : address;
+  const std::string& host = options.tls ? broker.host : numeric_address;
   mosquitto_property* properties = nullptr;
   int code = mosquitto_property_add_int32(&properties, MQTT_PROP_SESSION_EXPIRY_INTERVAL,
                                           options.session_expiry_s);
@@ -116,7 +122,7 @@ int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const std::st
                                         options.max_packet_bytes);
   }
   if (code == MOSQ_ERR_SUCCESS) {
-    code = mosquitto_connect_bind_v5(handle, host.c_str(), options.port, options.keepalive_s,
+    code = mosquitto_connect_bind_v5(handle, host.c_str(), broker.port, options.keepalive_s,
                                      nullptr, properties);
   }
   const int system_error = errno;  // Explains MOSQ_ERR_ERRNO.

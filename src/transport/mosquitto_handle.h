@@ -26,8 +26,10 @@ std::string UnreadableTlsFile(const MqttTlsConfig& tls);
 /// to its callbacks. Throws Error when the library refuses an option or a TLS file.
 MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data);
 
-/// One blocking connection attempt to an address that was just seen to answer; 0 or a library code.
-int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const std::string& address);
+/// One blocking connection attempt to the broker, at an address that was just seen to answer; 0 or
+/// a library code.
+int ConnectMosquitto(mosquitto* handle, const MqttConfig& options, const MqttAddress& broker,
+                     const std::string& numeric_address);
 
 /// The library's result code in words without a full stop, with the system's own error where that
 /// is the cause.

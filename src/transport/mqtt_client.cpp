@@ -61,6 +61,7 @@ class MqttClient::Connection {
         queue_(options.queue_messages, options.queue_bytes),
         backoff_(options.reconnect_min_s, options.reconnect_max_s, options.reconnect_jitter_seed) {
     CheckMqttOptions(options_);
+    statistics_.broker = {options_.host, options_.port};
     handle_ = MakeMosquittoHandle(options_, this);
     mosquitto_connect_v5_callback_set(handle_.get(), &OnConnect);
     mosquitto_disconnect_v5_callback_set(handle_.get(), &OnDisconnect);
@@ -128,13 +129,25 @@ class MqttClient::Connection {
     if (!loss_reason_.empty()) return;
     // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
     // let it try only what has just answered.
-    const TcpProbeResult probe =
-        ProbeTcp(options_.host, options_.port, options_.connect_timeout_s, stop_.fd());
+    MqttAddress broker{options_.host, options_.port};
+    TcpProbeResult probe =
+        ProbeTcp(broker.host, broker.port, options_.connect_timeout_s, stop_.fd());
+    std::string errors = probe.error;
+    for (const MqttAddress& fallback : options_.fallbacks) {
+      if (probe.error.empty() || stopping_) break;
+      broker = fallback;
+      probe = ProbeTcp(broker.host, broker.port, options_.connect_timeout_s, stop_.fd());
+      errors += "; " + probe.error;
+    }
     if (!probe.error.empty()) {
-      loss_reason_ = probe.error;
+      loss_reason_ = errors;
       return;
     }
-    const int code = ConnectMosquitto(handle_.get(), options_, probe.numeric_address);
+    {
+      const MutexLock lock(mutex_);
+      statistics_.broker = broker;
+    }
+    const int code = ConnectMosquitto(handle_.get(), options_, broker, probe.numeric_address);
     if (code != MOSQ_ERR_SUCCESS) {
       loss_reason_ = "cannot connect to the broker: " + DescribeLoss(code);
       return;

@@ -21,10 +21,22 @@ struct MqttTlsConfig {
   std::string key_file;
 };
 
+/// Where a broker listens.
+struct MqttAddress {
+  std::string host;
+  int port = 1883;
+  bool operator==(const MqttAddress& other) const {
+    return host == other.host && port == other.port;
+  }
+};
+
 /// How to reach a broker and how much to hold back. Every connection speaks MQTT v5.
 struct MqttConfig {
   std::string host = "127.0.0.1";
   int port = 1883;
+  /// Other addresses of the broker: each attempt takes the first that answers, in this order after
+  /// host and port. They are checked as those are.
+  std::vector<MqttAddress> fallbacks;
   std::string client_id;  ///< Required. The broker may replace it by the user name.
   std::string user;       ///< Empty: no login.
   std::string password;
@@ -94,6 +106,7 @@ struct MqttStatistics {
   std::uint64_t received_bytes = 0;  ///< Payload and topic.
   std::size_t queued = 0;            ///< Now waiting to be sent.
   std::size_t inflight = 0;          ///< Now sent and not yet answered.
+  MqttAddress broker;                ///< That answered last; at first host and port.
   std::string last_error;            ///< The last thing that went wrong, empty if nothing.
 };
 

@@ -130,6 +130,24 @@ TEST_F(MqttClientTest, NeverReceivesAnotherVehiclesMessages) {
   EXPECT_EQ(car_log_.payloads(), std::set<std::string>{"notice"});
 }
 
+TEST_F(MqttClientTest, TakesTheFirstAddressThatAnswersAndNamesAllWhenNoneDoes) {
+  BrokerProcess first;
+  first.Start();
+  MqttConfig options = Login(first, "car-1");
+  options.password = broker_.Password("car-1");
+  first.Kill();
+  options.fallbacks = {{"127.0.0.1", FreePort()}, {"127.0.0.1", broker_.port()}};
+  const MqttClient car(options, {}, car_log_.Callbacks());
+  ASSERT_TRUE(Eventually([&] { return car.connected(); }));
+  EXPECT_EQ(car.statistics().broker.port, broker_.port());
+  EXPECT_EQ(car.statistics().connection_failures, 0U) << "that was one attempt";
+  broker_.Kill();
+  ASSERT_TRUE(Eventually([&] { return !car_log_.losses().empty(); }));
+  ASSERT_TRUE(Eventually([&] { return car.statistics().connection_failures > 0; }));
+  EXPECT_THAT(car_log_.losses().back(), HasSubstr(std::to_string(options.port)));
+  EXPECT_THAT(car_log_.losses().back(), HasSubstr(std::to_string(broker_.port())));
+}
+
 TEST_F(MqttClientTest, SaysThatTheLoginWasRefusedAndKeepsTrying) {
   MqttConfig options = Login(broker_, "car-1");
   options.password = "wrong";

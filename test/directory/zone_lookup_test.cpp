@@ -1,0 +1,71 @@
+#include "directory/zone_lookup.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include "test/directory/test_authority.h"
+#include "test/support/temporary_directory.h"
+
+namespace livemap::directory {
+namespace {
+
+constexpr geo::GeoPoint kOakland{40.44, -79.95};
+
+class ZoneLookupTest : public testing::Test {
+ protected:
+  ZoneLookupTest() : path_(folder_.path() + "/zones.cms") {
+    std::ofstream(folder_.path() + "/ca.pem") << authority_.Pem();
+  }
+
+  /// As another part of the vehicle writes it, `later_s` after the file before.
+  void Write(const std::string& bytes, int later_s) {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
+    std::filesystem::last_write_time(
+        path_, std::filesystem::last_write_time(path_) + std::chrono::seconds(later_s));
+  }
+  ZoneLookup Lookup() {
+    return {
+        {path_}, TrustedAuthority::Read(folder_.path() + "/ca.pem"), [this] { return now_ns_; }};
+  }
+
+  const TestAuthority authority_;
+  const test::TemporaryDirectory folder_;
+  const std::string path_;
+  std::int64_t now_ns_ = kMarchNs;
+};
+
+TEST_F(ZoneLookupTest, KnowsNoZoneUntilThereIsADirectory) {
+  ZoneLookup zones = Lookup();
+  EXPECT_EQ(zones.IdAt(kOakland), "");
+  Write(authority_.Sign(DirectoryText(1)), 0);
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland");
+  EXPECT_EQ(zones.IdAt({50, 8}), "") << "far from all zones";
+}
+
+TEST_F(ZoneLookupTest, ReadsTheFileAgainWhenItHasChanged) {
+  Write(authority_.Sign(DirectoryText(1)), 0);
+  ZoneLookup zones = Lookup();
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland");
+  std::string text = DirectoryText(2);
+  text.replace(text.find("oakland"), 7, "shadyside");
+  Write(authority_.Sign(text), 1);
+  EXPECT_EQ(zones.IdAt(kOakland), "shadyside");
+  std::filesystem::remove(path_);
+  EXPECT_EQ(zones.IdAt(kOakland), "shadyside") << "which is still in time";
+}
+
+TEST_F(ZoneLookupTest, ADirectoryThatIsForgedOrExpiredCountsForNothing) {
+  Write(TestAuthority().Sign(DirectoryText(1)), 0);
+  ZoneLookup zones = Lookup();
+  EXPECT_EQ(zones.IdAt(kOakland), "");
+  Write(authority_.Sign(DirectoryText(1)), 1);
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland");
+  now_ns_ += 100'000'000'000'000'000;  // Over three years.
+  EXPECT_EQ(zones.IdAt(kOakland), "");
+}
+
+}  // namespace
+}  // namespace livemap::directory
