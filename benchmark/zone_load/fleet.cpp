@@ -13,6 +13,7 @@
 
 #include "common/clock.h"
 #include "common/error.h"
+#include "ros/bridge/bridged_type.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "transport/envelope.h"
 
@@ -37,13 +38,12 @@ std::vector<std::uint8_t> Enclose(const Message& message) {
 /// The zone is ours: what it sends is trusted but for its type.
 template <typename Message>
 Message Open(const transport::MqttMessage& message) {
-  const transport::DecodedEnvelope decoded = transport::DecodeEnvelope(message.payload, kMaxBytes);
-  if (!decoded.envelope) throw Error("message of the zone: " + decoded.reason);
-  if (decoded.envelope->md5 != *transport::ParseMd5(ros::message_traits::md5sum<Message>())) {
-    throw Error("the zone's messages are of another version than this program's");
-  }
+  static const auto type =
+      ros_io::MakeBridgedType(ros::message_traits::datatype<Message>(), kMaxBytes);
+  const ros_io::DecodedBridgeMessage decoded = type->Decode(message.payload);
+  if (!decoded.reason.empty()) throw Error("message of the zone: " + decoded.reason);
   Message content;
-  const transport::ByteView payload = decoded.envelope->payload;
+  const transport::ByteView payload = decoded.serialised;
   // The stream wants a writable pointer and only reads.
   ros::serialization::IStream stream(const_cast<std::uint8_t*>(payload.data),
                                      static_cast<std::uint32_t>(payload.size));

@@ -10,12 +10,15 @@ import unittest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
 
+import genmsg  # noqa: E402
+import genmsg.msg_loader  # noqa: E402
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from livemap.msg import (  # noqa: E402
     HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange, ReportReceipt, VehiclePosition)
+from node_testing import SOURCE_DIRECTORY  # noqa: E402
 from mqtt_bridge_fixture import (  # noqa: E402
-    Bridge, Broker, Master, Peer, envelope, eventually, serialise)
+    Bridge, Broker, Master, Peer, WIRE_MD5, envelope, eventually, serialise, wire_payload)
 
 ZONE_TOPICS = {
     "sub:/hazard/report": HazardReport,
@@ -54,6 +57,7 @@ def report(drive_id):
     return message
 
 
+STANDARD_MESSAGES = "/usr/share/{}/msg"
 # Of HazardReport.msg before it had the fields that are now its last 16 bytes.
 MD5_OF_VERSION_1 = "6c9f383b83ba26551f53b42caa304fa7"
 
@@ -172,7 +176,7 @@ class MqttBridgeTest(unittest.TestCase):
 
     def test_hostile_payloads_are_refused_and_counted_and_a_good_one_still_passes(self):
         good = report("raw")
-        body = serialise(good)
+        body = wire_payload(good)
         huge_length = bytearray(body)
         huge_length[18:22] = struct.pack("<I", 0xFFFFFFFF)  # the length of vehicle_id
         hostile = [
@@ -211,12 +215,52 @@ class MqttBridgeTest(unittest.TestCase):
         old.schema_version = 1
         old.shown_width = 77
         self.broker.publish_raw("car-2", "livemap/v1/test/vehicle/car-2/report",
-                                envelope(old, md5=MD5_OF_VERSION_1, payload=serialise(old)[:-16]))
+                                envelope(old, md5=MD5_OF_VERSION_1, payload=wire_payload(old)[:-16]))
         received = eventually(lambda: self.reports_of("of version 1"), "it arrives")[0]
         self.assertEqual((received.schema_version, received.vehicle_id), (1, "car-2"))
         self.assertEqual(bytes(received.image.data), bytes(old.image.data))
         self.assertEqual((received.shown_x, received.shown_y, received.shown_width, received.shown_height),
                          (0, 0, 0, 0))
+
+    def test_the_zone_in_a_message_stays_on_the_vehicle_and_comes_from_the_topic(self):
+        path = os.path.join(self.broker.directory, "raw")
+        listener = self.broker.subscribe_raw("zone", "livemap/v1/test/vehicle/car-1/change", path)
+        change = MapChange(class_name="with a zone", zone="test")
+
+        def arrived():
+            self.vehicle_peer.publish("/change/map_change", change)
+            return listener.poll() is not None
+        eventually(arrived, "the raw payload arrives")
+        with open(path, "rb") as file:
+            self.assertEqual(file.read(), envelope(change), "as vehicles without the field send it")
+        received = [c for c in self.zone_peer.received("/change/map_change") if c.class_name == "with a zone"]
+        self.assertEqual({c.zone for c in received}, {""})
+        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=77, zone="elsewhere"))
+        notice = eventually(lambda: [n for n in self.vehicle_peer.received("/hazard/notice") if n.sequence == 77],
+                            "the notice arrives")[0]
+        self.assertEqual(notice.zone, "test")
+
+    def test_a_message_for_a_zone_that_is_not_connected_is_dropped_and_counted(self):
+        before = self.vehicle_count("car_bridge", "reports_dropped")
+        elsewhere = report("for elsewhere")
+        elsewhere.zone = "elsewhere"
+        self.vehicle_peer.publish("/hazard/report", elsewhere)
+        eventually(lambda: self.vehicle_count("car_bridge", "reports_dropped") == before + 1, "it is counted")
+        self.assertEqual(self.reports_of("for elsewhere"), [])
+
+    def test_definitions_on_the_wire_are_the_messages_without_their_zone(self):
+        for name, md5 in WIRE_MD5.items():
+            with self.subTest(name):
+                context = genmsg.MsgContext.create_default()
+                path = os.path.join(SOURCE_DIRECTORY, "msg", name.split("/")[1] + ".msg")
+                with open(path, encoding="utf-8") as file:
+                    lines = file.read().rstrip("\n").split("\n")
+                self.assertRegex(lines[-1], r"^string zone\b")
+                search = {"livemap": [os.path.dirname(path)], "std_msgs": [STANDARD_MESSAGES.format("std_msgs")],
+                          "sensor_msgs": [STANDARD_MESSAGES.format("sensor_msgs")]}
+                spec = genmsg.msg_loader.load_msg_from_string(context, "\n".join(lines[:-1]), name)
+                genmsg.msg_loader.load_depends(context, spec, search)
+                self.assertEqual(genmsg.compute_md5(context, spec), md5)
 
     def test_broker_keeps_a_vehicle_from_another_vehicles_topic(self):
         forged = envelope(report("forged"))

@@ -116,7 +116,8 @@ class Wire:
         for topic, payload in list(self.messages):
             if topic.endswith("/" + kind):
                 name_length = payload[8]
-                found.append(message_class().deserialize(payload[9 + name_length + 16 + 4:]))
+                # On the wire a message has no zone.
+                found.append(message_class().deserialize(payload[9 + name_length + 16 + 4:] + bytes(4)))
         return found
 
     def pictures(self):

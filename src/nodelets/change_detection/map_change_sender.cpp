@@ -30,11 +30,12 @@ MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, st
 void MapChangeSender::Tell(const std::vector<change::PlacedChange>& passed) {
   const MutexLock lock(mutex_);
   for (const change::PlacedChange& change : passed) {
-    const auto report = ros_io::ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
+    auto report = ros_io::ToMapChangeReport(change, config_.drive_id, Uuid::Random(random_));
     if (!report || report->confidence < config_.min_confidence) {
       ++unsure_;
       continue;
     }
+    if (config_.zones) report->zone = config_.zones->IdAt(report->position);
     try {
       outbox_.Add(*report, SteadyS());
     } catch (const Error& error) {

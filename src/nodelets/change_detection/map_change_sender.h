@@ -10,6 +10,7 @@
 
 #include "change/objects/change_detector.h"
 #include "common/mutex.h"
+#include "directory/zone_lookup.h"
 #include "nodelets/diagnostics.h"
 #include "vehicle/outbox/map_change_outbox.h"
 
@@ -20,7 +21,8 @@ class MapChangeSender {
  public:
   struct Config {
     std::string drive_id;
-    double min_confidence = 0.5;  ///< Less sure objects are not told.
+    double min_confidence = 0.5;                   ///< Less sure objects are not told.
+    std::shared_ptr<directory::ZoneLookup> zones;  ///< Null: all objects lie in outbox.zone.
     vehicle::MapChangeOutbox::Config outbox;
   };
 

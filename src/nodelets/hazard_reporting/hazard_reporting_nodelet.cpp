@@ -2,6 +2,7 @@
 #include <image_transport/image_transport.h>
 #include <image_transport/subscriber.h>
 #include <livemap/BestViews.h>
+#include <livemap/VehicleZones.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/package.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -84,6 +85,10 @@ class HazardReportingPart : public NodeletPart {
     MakeDirectoryOf(config_.reporter.map.path);
     reporter_ = std::make_unique<vehicle::HazardReporter>(
         config_.reporter, catalogue_, EntropySeededGenerator(), now_ns, SteadyS());
+    if (auto zones = ros_io::MakeZoneLookup(config_.zones)) {
+      reporter_->SetZoneLookup(
+          [zones](const geo::GeoPoint& position) { return zones->IdAt(position); });
+    }
     responder_ = std::make_unique<vehicle::PollResponder>(config_.polls, catalogue_);
     maker_ = std::make_unique<PictureMaker>(MakeMaskerConfig(config_.privacy, config_.mask),
                                             getName(), config_.draw_boxes);
@@ -139,6 +144,7 @@ class HazardReportingPart : public NodeletPart {
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
         node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
         node.subscribe("change/report", 100, &Self::OnChanges, this),
+        node.subscribe("zones", 1, &Self::OnZones, this),
     };
     if (config_.use_events) {
       subscribers_.push_back(node.subscribe("hazard/events", 100, &Self::OnEvents, this));
@@ -298,6 +304,8 @@ class HazardReportingPart : public NodeletPart {
     }
     Work();
   }
+
+  void OnZones(const VehicleZones& message) { view_->SetZones(message.zones); }
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     if (!stamps_->IsUsable("a fix", message.header.stamp)) return;

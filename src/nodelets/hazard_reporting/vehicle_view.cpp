@@ -92,7 +92,13 @@ void VehicleView::TellPosition(const geo::TrackPose& pose, const ros::Time& stam
                                    pose.speed_mps,
                                    ros_io::FromRosTime(stamp)};
   const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
-  position_publisher_.publish(ros_io::ToMessage(vehicle, sigma_m, reporter_.map().map_sequence()));
+  const std::vector<std::string> configured_alone = {""};
+  for (const std::string& zone : zones_.empty() ? configured_alone : zones_) {
+    VehiclePosition position =
+        ros_io::ToMessage(vehicle, sigma_m, reporter_.map().map_sequence(zone));
+    position.zone = zone;
+    position_publisher_.publish(position);
+  }
 }
 
 /// base_link on the path, and on tf where no odometry does it.

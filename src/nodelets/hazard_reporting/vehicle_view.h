@@ -8,6 +8,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "geo/datum.h"
 #include "ros/parameters/hazard_reporting_parameters.h"
@@ -28,6 +31,9 @@ class VehicleView {
   /// The map frame's place on earth, once it is known.
   const std::optional<geo::LocalFrame>& map() const { return map_; }
 
+  /// Ids of the zones that are told each position, each with what the vehicle knows of it. None:
+  /// the configured zone is.
+  void SetZones(std::vector<std::string> zones) { zones_ = std::move(zones); }
   /// Where the fix of this stamp is: `antenna`.
   void ShowFix(std::int64_t stamp_ns, const geo::TrackPose& antenna);
   /// Where base_link is by a fused pose; the map is known.
@@ -48,6 +54,7 @@ class VehicleView {
   std::optional<geo::LocalFrame> map_;
   geometry_msgs::Transform earth_from_map_;  // By which map_ was made, if it was.
   std::optional<ros::Time> position_stamp_;
+  std::vector<std::string> zones_;
   nav_msgs::Path path_;
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   ros::Publisher position_publisher_, marker_publisher_, path_publisher_;

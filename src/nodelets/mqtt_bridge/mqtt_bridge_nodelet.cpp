@@ -1,26 +1,51 @@
+#include <livemap/VehicleZones.h>
+#include <sensor_msgs/NavSatFix.h>
+
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <random>
 #include <set>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
+#include "common/mutex.h"
+#include "directory/directory_keeper.h"
+#include "directory/zone_handover.h"
 #include "nodelets/diagnostics.h"
+#include "nodelets/mqtt_bridge/zone_connections.h"
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/bridge/bridged_type.h"
+#include "ros/conversions/hazard_conversions.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
 #include "transport/mqtt_client.h"
 #include "transport/topic_template.h"
 
 namespace livemap::nodelets {
+namespace {
+
+constexpr double kZoneTickS = 0.5;
+/// Fixes count when no fused one has come for so long.
+constexpr double kFusedSilenceS = 2;
+
+}  // namespace
 
 /// The multi-master bridge: carries the listed topics between this ROS master and the zone's MQTT
 /// broker. On the zone's side it writes the vehicle whose login the broker checked (it stands in
 /// the MQTT topic) into each message, and sends messages with an addressee to that vehicle's topic.
+///
+/// On a vehicle with a zone directory it connects to the brokers of several zones, as ZoneHandover
+/// decides by the vehicle's position. It writes the zone into each message that comes in, and sends
+/// a message to the zone in it; without one to the present zone.
 class MqttBridgePart : public NodeletPart {
  public:
   ~MqttBridgePart() override { Close(); }
@@ -61,10 +86,12 @@ class MqttBridgePart : public NodeletPart {
   };
 
   void Close() {
-    // Nothing may call into the client while it goes, nor the client into the topics.
+    // Nothing may call into the clients while they go, nor the clients into the topics.
     diagnostics_.reset();
+    zone_timer_.stop();
+    for (ros::Subscriber& subscriber : position_subscribers_) subscriber.shutdown();
     for (const auto& topic : topics_) topic->subscriber.shutdown();
-    client_.reset();
+    connections_.reset();
     topics_.clear();
   }
 
@@ -78,8 +105,14 @@ class MqttBridgePart : public NodeletPart {
     for (const ros_io::BridgeTopic& topic : config_.topics) {
       topics_.push_back(std::make_unique<Topic>(topic));
     }
-    // Publishers stand before the client can call, the client before subscribers can.
-    StartClient(AdvertiseIncoming());
+    // Publishers stand before a client can call, the clients before subscribers can.
+    AdvertiseIncoming();
+    MakeConnections();
+    if (FollowsZones()) {
+      FollowZones();
+    } else {
+      connections_->Keep({ConfiguredZone()});
+    }
     SubscribeOutgoing();
     diagnostics_ = std::make_unique<Diagnostics>(
         getNodeHandle(), getPrivateNodeHandle(),
@@ -87,45 +120,155 @@ class MqttBridgePart : public NodeletPart {
         [this](Diagnostics::Status& status) { Diagnose(status); });
   }
 
-  std::vector<transport::MqttSubscription> AdvertiseIncoming() {
-    // A zone listens to every vehicle, a vehicle to what is addressed to it.
-    const transport::TopicNames names{
-        config_.zone, config_.role == ros_io::BridgeRole::kZone ? "" : config_.user};
-    std::vector<transport::MqttSubscription> subscriptions;
+  void AdvertiseIncoming() {
     for (const auto& topic : topics_) {
       if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       topic->publisher =
           topic->type->Advertise(getNodeHandle(), topic->config.ros_topic,
                                  static_cast<std::uint32_t>(topic->config.ros_queue));
+    }
+  }
+
+  std::vector<transport::MqttSubscription> SubscriptionsOf(const std::string& zone) const {
+    // A zone listens to every vehicle, a vehicle to what is addressed to it.
+    const transport::TopicNames names{zone, IsZone() ? "" : config_.user};
+    std::vector<transport::MqttSubscription> subscriptions;
+    for (const auto& topic : topics_) {
+      if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       subscriptions.push_back({topic->mqtt_topic.SubscriptionFilter(names), topic->config.qos});
     }
     return subscriptions;
   }
 
-  void StartClient(std::vector<transport::MqttSubscription> subscriptions) {
-    transport::MqttCallbacks callbacks;
-    callbacks.on_message = [this](const transport::MqttMessage& message) { Receive(message); };
-    callbacks.on_published = [this](const transport::MqttPublishOutcome& outcome) {
+  void MakeConnections() {
+    ZoneConnections::Events events;
+    events.on_message = [this](const std::string& zone, const transport::MqttMessage& message) {
+      Receive(zone, message);
+    };
+    events.on_published = [this](const transport::MqttPublishOutcome& outcome) {
       CountOutcome(outcome);
     };
-    callbacks.on_connection = [this](bool connected, const std::string& reason) {
-      if (connected) {
-        NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
-                     config_.mqtt.port, config_.user.c_str());
-      } else {
-        SayLoss(reason);
-      }
+    events.on_connection = [this](const std::string& zone, bool connected,
+                                  const std::string& reason) {
+      connected ? SayConnection(zone) : SayLoss(zone, reason);
     };
-    client_ = std::make_unique<transport::MqttClient>(config_.mqtt, std::move(subscriptions),
-                                                      std::move(callbacks));
+    connections_ = std::make_unique<ZoneConnections>(
+        config_.mqtt, [this](const std::string& zone) { return SubscriptionsOf(zone); },
+        std::move(events));
+  }
+
+  bool FollowsZones() const { return !config_.zones.directory.empty(); }
+  bool IsZone() const { return config_.role == ros_io::BridgeRole::kZone; }
+
+  ZoneConnections::Zone ConfiguredZone() const {
+    return {config_.zone, {{config_.mqtt.host, config_.mqtt.port}}};
+  }
+
+  /// Starts to choose the zones by the vehicle's position.
+  void FollowZones() {
+    ReadDirectory();
+    StayWithConfiguredZone();
+    zones_publisher_ = getNodeHandle().advertise<VehicleZones>("zones", 1, /*latch=*/true);
+    position_subscribers_ = {
+        getNodeHandle().subscribe("fix", 10, &MqttBridgePart::OnFix, this),
+        getNodeHandle().subscribe("localization/fix", 10, &MqttBridgePart::OnFusedFix, this),
+    };
+    ConnectToZones();
+    zone_timer_ = getNodeHandle().createSteadyTimer(ros::WallDuration(kZoneTickS),
+                                                    [this](const ros::SteadyTimerEvent&) {
+                                                      ReadDirectory();
+                                                      ConnectToZones();
+                                                    });
+  }
+
+  /// Again when somebody has put another file in its place.
+  void ReadDirectory() {
+    std::error_code missing;
+    const auto time = std::filesystem::last_write_time(config_.zones.directory, missing);
+    if (keeper_ && (missing || time == directory_time_)) return;
+    directory_time_ = time;
+    keeper_ = std::make_unique<directory::DirectoryKeeper>(
+        directory::TrustedAuthority::Read(config_.zones.authority), config_.zones.directory);
+    if (!keeper_->damage().empty()) NODELET_ERROR("%s", keeper_->damage().c_str());
+  }
+
+  void StayWithConfiguredZone() {
+    handover_ = std::make_unique<directory::ZoneHandover>(config_.handover, config_.zone);
+  }
+
+  void OnFix(const sensor_msgs::NavSatFix& message) {
+    if (fused_s_ && SteadyS() - *fused_s_ < kFusedSilenceS) return;
+    MoveTo(message);
+  }
+
+  void OnFusedFix(const sensor_msgs::NavSatFix& message) {
+    fused_s_ = SteadyS();
+    MoveTo(message);
+  }
+
+  void MoveTo(const sensor_msgs::NavSatFix& message) {
+    const geo::Fix fix = ros_io::ToFix(message);
+    const auto directory = keeper_->directory();
+    if (!fix.has_fix || !geo::IsValid(fix.position) || !directory) return;
+    if (handover_->Move(*directory, fix.position)) {
+      NODELET_INFO("the present zone is '%s'", handover_->present().c_str());
+    }
+    ConnectToZones();
+  }
+
+  void ConnectToZones() {
+    const auto directory = keeper_->directory();
+    if (!directory && handover_->present() != config_.zone) StayWithConfiguredZone();
+    std::vector<ZoneConnections::Zone> zones;
+    for (const std::string& id : handover_->Wanted(SteadyS(), connections_->Waiting())) {
+      if (auto zone = FindZone(id, directory.get())) zones.push_back(std::move(*zone));
+    }
+    connections_->Keep(zones);
+    if (told_zones_ == handover_->near()) return;
+    told_zones_ = handover_->near();
+    VehicleZones message;
+    message.zones = told_zones_;
+    zones_publisher_.publish(message);
+  }
+
+  /// Nothing where nobody says where its broker is.
+  std::optional<ZoneConnections::Zone> FindZone(const std::string& id,
+                                                const directory::ZoneDirectory* directory) const {
+    const auto found = directory != nullptr ? directory->FindId(id) : std::nullopt;
+    if (found) {
+      ZoneConnections::Zone zone{id, {}};
+      for (const directory::BrokerAddress& broker : directory->zones()[*found].brokers) {
+        zone.brokers.push_back({broker.host, broker.port});
+      }
+      return zone;
+    }
+    if (id == config_.zone) return ConfiguredZone();
+    return std::nullopt;
+  }
+
+  void SayConnection(const std::string& zone) const {
+    if (FollowsZones()) {
+      NODELET_INFO("connected to the broker of zone '%s' as '%s'", zone.c_str(),
+                   config_.user.c_str());
+    } else {
+      NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
+                   config_.mqtt.port, config_.user.c_str());
+    }
   }
 
   /// Each reason once a minute: a connection may end without one, and the next attempt have it.
-  void SayLoss(const std::string& reason) {
+  void SayLoss(const std::string& zone, const std::string& reason) {
     constexpr std::size_t kMaxReasons = 10;
-    if (say_losses_again_.Due()) said_losses_.clear();
-    if (said_losses_.size() >= kMaxReasons || !said_losses_.insert(reason).second) return;
-    NODELET_WARN("%s; trying again", reason.c_str());
+    {
+      const MutexLock lock(losses_mutex_);
+      if (say_losses_again_.Due()) said_losses_.clear();
+      if (said_losses_.size() >= kMaxReasons || !said_losses_.insert(zone + reason).second) return;
+    }
+    if (FollowsZones()) {
+      NODELET_WARN("zone '%s': %s; trying again", zone.c_str(), reason.c_str());
+    } else {
+      NODELET_WARN("%s; trying again", reason.c_str());
+    }
   }
 
   void SubscribeOutgoing() {
@@ -148,45 +291,62 @@ class MqttBridgePart : public NodeletPart {
                                " bytes, at most " + std::to_string(topic.config.max_bytes) +
                                " are accepted");
     }
-    const std::string& vehicle =
-        config_.role == ros_io::BridgeRole::kZone ? message.vehicle_id : config_.user;
+    const std::string& vehicle = IsZone() ? message.vehicle_id : config_.user;
     if (topic.mqtt_topic.has_vehicle() && !transport::IsValidId(vehicle)) {
       return Refuse(topic, "the addressee '" + vehicle + "' is no vehicle id");
     }
+    const std::string zone = AddresseeOf(message);
+    transport::MqttClient* const client = ConnectionTo(zone);
     // A report that is dropped here is sent again by its owner until the zone's receipt comes.
-    if (!topic.config.keep_when_disconnected && !client_->connected()) {
+    if (client == nullptr || (!topic.config.keep_when_disconnected && !client->connected())) {
       ++topic.dropped;
       return;
     }
     const transport::MqttPublishStatus status =
-        client_->Publish(topic.mqtt_topic.Expand({config_.zone, vehicle}),
-                         std::move(message.envelope), topic.config.qos, index);
+        client->Publish(topic.mqtt_topic.Expand({zone, vehicle}), std::move(message.envelope),
+                        topic.config.qos, index);
     if (status != transport::MqttPublishStatus::kQueued) ++topic.dropped;
   }
 
-  /// From the broker to ROS, on the client's thread.
-  void Receive(const transport::MqttMessage& message) {
+  /// Id of the zone to which the message goes.
+  std::string AddresseeOf(const ros_io::OutgoingBridgeMessage& message) const {
+    if (IsZone()) return config_.zone;
+    if (!message.zone.empty()) return message.zone;
+    return handover_ ? handover_->present() : config_.zone;
+  }
+
+  /// The connection to a zone, which may have to be made; null: it is not known where its broker
+  /// is, or other zones have the connections.
+  transport::MqttClient* ConnectionTo(const std::string& zone) {
+    if (handover_ && FindZone(zone, keeper_->directory().get())) {
+      handover_->NoteMessage(zone, SteadyS());
+      if (connections_->Find(zone) == nullptr) ConnectToZones();
+    }
+    return connections_->Find(zone);
+  }
+
+  /// From the broker of `zone` to ROS, on its client's thread.
+  void Receive(const std::string& zone, const transport::MqttMessage& message) {
     for (const auto& topic : topics_) {
       if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       const std::optional<transport::TopicNames> names = topic->mqtt_topic.Match(message.topic);
-      if (!names || (topic->mqtt_topic.has_zone() && names->zone != config_.zone)) continue;
-      return Publish(*topic, *names, message);
+      if (!names || (topic->mqtt_topic.has_zone() && names->zone != zone)) continue;
+      return Publish(*topic, zone, *names, message);
     }
     ++unexpected_;
   }
 
-  void Publish(Topic& topic, const transport::TopicNames& names,
+  void Publish(Topic& topic, const std::string& zone, const transport::TopicNames& names,
                const transport::MqttMessage& message) {
     if (message.payload.size > static_cast<std::size_t>(topic.config.max_bytes)) {
       return Refuse(topic, "from '" + names.vehicle + "': the message has " +
                                std::to_string(message.payload.size) + " bytes, at most " +
                                std::to_string(topic.config.max_bytes) + " are accepted");
     }
-    const std::optional<std::string> sender = config_.role == ros_io::BridgeRole::kZone
-                                                  ? std::make_optional(names.vehicle)
-                                                  : std::nullopt;
+    const ros_io::BridgeOrigin origin =
+        IsZone() ? ros_io::BridgeOrigin{names.vehicle, ""} : ros_io::BridgeOrigin{{}, zone};
     const std::optional<std::string> fault =
-        topic.type->PublishChecked(topic.publisher, message.payload, sender);
+        topic.type->PublishChecked(topic.publisher, message.payload, origin);
     if (fault) return Refuse(topic, "from '" + names.vehicle + "': " + *fault);
     ++topic.carried;
     topic.bytes += message.topic.size() + message.payload.size;
@@ -208,7 +368,11 @@ class MqttBridgePart : public NodeletPart {
   }
 
   void Diagnose(Diagnostics::Status& status) {
-    const transport::MqttStatistics mqtt = client_->statistics();
+    const std::map<std::string, transport::MqttStatistics> zones = connections_->Statistics();
+    const std::string present = handover_ ? handover_->present() : config_.zone;
+    const auto found = zones.find(present);
+    const transport::MqttStatistics mqtt =
+        found != zones.end() ? found->second : transport::MqttStatistics();
     if (!mqtt.connected) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
                      mqtt.last_error.empty() ? "connecting" : mqtt.last_error);
@@ -218,7 +382,7 @@ class MqttBridgePart : public NodeletPart {
       status.summary(diagnostic_msgs::DiagnosticStatus::OK, "connected");
     }
     status.add("connected", mqtt.connected);
-    status.add("broker", config_.mqtt.host + ":" + std::to_string(config_.mqtt.port));
+    status.add("broker", mqtt.broker.host + ":" + std::to_string(mqtt.broker.port));
     status.add("user", config_.user);
     status.add("last_error", mqtt.last_error);
     status.add("connections", mqtt.connections);
@@ -237,14 +401,43 @@ class MqttBridgePart : public NodeletPart {
       status.add(topic->config.name + "_refused", topic->refused.load());
       if (out) status.add(topic->config.name + "_dropped", topic->dropped.load());
     }
+    if (!handover_) return;
+    status.add("present_zone", present);
+    const auto directory = keeper_->directory();
+    status.add("zone_directory_version", directory ? directory->version() : 0);
+    for (const auto& [zone, connection] : zones) DiagnoseZone(zone, connection, status);
+  }
+
+  static void DiagnoseZone(const std::string& zone, const transport::MqttStatistics& connection,
+                           Diagnostics::Status& status) {
+    status.add(zone + ".connected", connection.connected);
+    status.add(zone + ".broker",
+               connection.broker.host + ":" + std::to_string(connection.broker.port));
+    status.add(zone + ".last_error", connection.last_error);
+    status.add(zone + ".connections", connection.connections);
+    status.add(zone + ".connection_failures", connection.connection_failures);
+    status.add(zone + ".uplink_bytes", connection.sent_bytes);
+    status.add(zone + ".downlink_bytes", connection.received_bytes);
+    status.add(zone + ".queued", connection.queued);
+    status.add(zone + ".inflight", connection.inflight);
   }
 
   ros_io::BridgeConfig config_;
   std::vector<std::unique_ptr<Topic>> topics_;  ///< The index is the tag of a publication.
   std::atomic<std::uint64_t> unexpected_{0};    ///< Received on a topic that is not in the list.
-  OnceAMinute say_losses_again_;
-  std::set<std::string> said_losses_;  ///< In this minute; the client's thread's.
-  std::unique_ptr<transport::MqttClient> client_;
+  Mutex losses_mutex_;
+  OnceAMinute say_losses_again_ GUARDED_BY(losses_mutex_);
+  std::set<std::string> said_losses_ GUARDED_BY(losses_mutex_);  ///< In this minute.
+  // Of a vehicle that changes zones; else null.
+  std::unique_ptr<directory::DirectoryKeeper> keeper_;
+  std::filesystem::file_time_type directory_time_{};  ///< Of the file that keeper_ has read.
+  std::unique_ptr<directory::ZoneHandover> handover_;
+  std::vector<std::string> told_zones_;
+  std::optional<double> fused_s_;  ///< When the last fused fix came.
+  ros::Publisher zones_publisher_;
+  std::vector<ros::Subscriber> position_subscribers_;
+  ros::SteadyTimer zone_timer_;
+  std::unique_ptr<ZoneConnections> connections_;
   std::unique_ptr<Diagnostics> diagnostics_;  ///< Last: it uses the rest.
 };
 

@@ -26,6 +26,14 @@ template <typename Message>
 struct HasVehicleId<Message, std::void_t<decltype(std::declval<Message&>().vehicle_id)>>
     : std::true_type {};
 
+template <typename Message, typename = void>
+struct HasZone : std::false_type {};
+template <typename Message>
+struct HasZone<Message, std::void_t<decltype(std::declval<Message&>().zone)>> : std::true_type {};
+
+/// Of a serialised text before its characters.
+constexpr std::size_t kTextLengthBytes = 4;
+
 transport::Md5 RequireBridgedMd5(const std::string& name, const std::string& text) {
   const std::optional<transport::Md5> md5 = transport::ParseMd5(text);
   if (!md5) throw Error("message type '" + name + "' has no MD5 but '" + text + "'");
@@ -35,10 +43,10 @@ transport::Md5 RequireBridgedMd5(const std::string& name, const std::string& tex
 template <typename Message>
 class TypedBridge : public BridgedType {
  public:
-  TypedBridge(std::size_t max_bytes, const transport::LayoutLimits& limits,
-              const std::vector<EarlierDefinition>& earlier)
+  TypedBridge(std::size_t max_bytes, const std::string& md5_without_zone,
+              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier)
       : BridgedType(ros::message_traits::datatype<Message>(),
-                    ros::message_traits::md5sum<Message>(),
+                    ros::message_traits::md5sum<Message>(), md5_without_zone,
                     ros::message_traits::definition<Message>(), max_bytes, limits, earlier) {}
 
   bool has_vehicle_id() const override { return HasVehicleId<Message>::value; }
@@ -50,9 +58,10 @@ class TypedBridge : public BridgedType {
         [this, send = std::move(send)](const Pointer& message) {
           OutgoingBridgeMessage outgoing;
           if constexpr (HasVehicleId<Message>::value) outgoing.vehicle_id = message->vehicle_id;
+          if constexpr (HasZone<Message>::value) outgoing.zone = message->zone;
           const std::vector<std::uint8_t> serialised = Serialise(*message);
           outgoing.fault = Check({serialised.data(), serialised.size()});
-          if (!outgoing.fault) outgoing.envelope = Enclose(serialised);
+          if (!outgoing.fault) outgoing.envelope = Enclose(serialised, outgoing.zone.size());
           send(std::move(outgoing));
         };
     return handle.subscribe<Message>(topic, queue_size, callback);
@@ -72,15 +81,16 @@ class TypedBridge : public BridgedType {
   }
 
   void Publish(const ros::Publisher& publisher, transport::ByteView serialised,
-               const std::optional<std::string>& vehicle_id) const override {
+               const BridgeOrigin& origin) const override {
     const boost::shared_ptr<Message> message = boost::make_shared<Message>();
     // The stream wants a writable pointer and only reads.
     ros::serialization::IStream stream(const_cast<std::uint8_t*>(serialised.data),
                                        static_cast<std::uint32_t>(serialised.size));
     ros::serialization::deserialize(stream, *message);
     if constexpr (HasVehicleId<Message>::value) {
-      if (vehicle_id) message->vehicle_id = *vehicle_id;
+      if (origin.vehicle_id) message->vehicle_id = *origin.vehicle_id;
     }
+    if constexpr (HasZone<Message>::value) message->zone = origin.zone;
     publisher.publish(message);
   }
 };
@@ -90,12 +100,13 @@ using Factory = std::function<std::unique_ptr<BridgedType>(std::size_t max_bytes
 /// `bulk_fields` may fill a message to its own limit; all other strings and arrays are short.
 template <typename Message>
 std::pair<const std::string, Factory> BridgedTypeEntry(
-    const std::vector<std::string>& bulk_fields = {},
+    const std::string& md5_without_zone, const std::vector<std::string>& bulk_fields = {},
     const std::vector<EarlierDefinition>& earlier = {}) {
-  return {ros::message_traits::datatype<Message>(), [bulk_fields, earlier](std::size_t max_bytes) {
+  return {ros::message_traits::datatype<Message>(), [=](std::size_t max_bytes) {
             transport::LayoutLimits limits;
             for (const std::string& field : bulk_fields) limits.fields[field] = max_bytes;
-            return std::make_unique<TypedBridge<Message>>(max_bytes, limits, earlier);
+            return std::make_unique<TypedBridge<Message>>(max_bytes, md5_without_zone, limits,
+                                                          earlier);
           }};
 }
 
@@ -103,38 +114,43 @@ std::pair<const std::string, Factory> BridgedTypeEntry(
 /// theirs, which did not say what a picture shows.
 const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
-      BridgedTypeEntry<CandidateFrame>({"image.data"}),
-      BridgedTypeEntry<HazardNotice>({"image.data"}),
-      BridgedTypeEntry<HazardPoll>({}, {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
-      BridgedTypeEntry<HazardPollAnswer>({"image.data"}),
-      BridgedTypeEntry<HazardReport>({"image.data"}, {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
-      BridgedTypeEntry<MapChange>(),
-      BridgedTypeEntry<ReportReceipt>(),
-      BridgedTypeEntry<VehiclePosition>(),
+      BridgedTypeEntry<CandidateFrame>("", {"image.data"}),
+      BridgedTypeEntry<HazardNotice>("88d23041ceb511154d96daa5ff718aef", {"image.data"}),
+      BridgedTypeEntry<HazardPoll>("78c6f168c0bc4ed892e7fbea24487d70", {},
+                                   {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
+      BridgedTypeEntry<HazardPollAnswer>("8f9e01f2a6d515909b89b0b9949f6e21", {"image.data"}),
+      BridgedTypeEntry<HazardReport>("157e70184e3e48f3be020c650d2f788a", {"image.data"},
+                                     {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
+      BridgedTypeEntry<MapChange>("f0c59a6ee1ac17ed9fe4b38192a4afe1"),
+      BridgedTypeEntry<ReportReceipt>("3bb0f7c51314b5a5e3dd08cca0268f28"),
+      BridgedTypeEntry<VehiclePosition>("9146c7869de30f12ed97927d98d9681d"),
   };
   return kRegistry;
 }
 
 }  // namespace
 
-BridgedType::BridgedType(std::string name, const std::string& md5, const std::string& definition,
+BridgedType::BridgedType(std::string name, const std::string& md5,
+                         const std::string& md5_without_zone, const std::string& definition,
                          std::size_t max_bytes, const transport::LayoutLimits& limits,
                          const std::vector<EarlierDefinition>& earlier)
     : name_(std::move(name)),
-      md5_(RequireBridgedMd5(name_, md5)),
+      wire_md5_(RequireBridgedMd5(name_, md5_without_zone.empty() ? md5 : md5_without_zone)),
+      has_zone_(!md5_without_zone.empty()),
       max_bytes_(max_bytes),
       layout_(name_, definition, limits) {
+  const std::size_t zone_bytes = has_zone_ ? kTextLengthBytes : 0;  // Of an empty one.
+  known_ = {{RequireBridgedMd5(name_, md5), 0}, {wire_md5_, zone_bytes}};
   for (const EarlierDefinition& definition_before : earlier) {
-    earlier_.emplace_back(RequireBridgedMd5(name_, definition_before.md5),
-                          definition_before.added_bytes);
+    known_.emplace_back(RequireBridgedMd5(name_, definition_before.md5),
+                        definition_before.added_bytes + zone_bytes);
   }
 }
 
 /// Bytes that the present definition has more than the one of that MD5; none: it is not known.
 std::optional<std::size_t> BridgedType::AddedSince(const transport::Md5& md5) const {
-  if (md5 == md5_) return 0;
-  for (const auto& [earlier, added_bytes] : earlier_) {
-    if (earlier == md5) return added_bytes;
+  for (const auto& [known, added_bytes] : known_) {
+    if (known == md5) return added_bytes;
   }
   return std::nullopt;
 }
@@ -143,32 +159,48 @@ std::optional<std::string> BridgedType::Check(transport::ByteView serialised) co
   return layout_.Check(serialised);
 }
 
-std::vector<std::uint8_t> BridgedType::Enclose(const std::vector<std::uint8_t>& serialised) const {
-  return transport::EncodeEnvelope({name_, md5_, {serialised.data(), serialised.size()}});
+std::vector<std::uint8_t> BridgedType::Enclose(const std::vector<std::uint8_t>& serialised,
+                                               std::size_t zone_size) const {
+  const std::size_t left_out = has_zone_ ? kTextLengthBytes + zone_size : 0;
+  return transport::EncodeEnvelope(
+      {name_, wire_md5_, {serialised.data(), serialised.size() - left_out}});
 }
 
-std::optional<std::string> BridgedType::PublishChecked(
-    const ros::Publisher& publisher, transport::ByteView bytes,
-    const std::optional<std::string>& vehicle_id) const {
+DecodedBridgeMessage BridgedType::Decode(transport::ByteView bytes) const {
+  DecodedBridgeMessage message;
   const transport::DecodedEnvelope decoded = transport::DecodeEnvelope(bytes, max_bytes_);
-  if (!decoded.envelope) return decoded.reason;
+  if (!decoded.envelope) {
+    message.reason = decoded.reason;
+    return message;
+  }
   if (decoded.envelope->type != name_) {
-    return "the message is of type '" + std::string(decoded.envelope->type) + "', accepted is '" +
-           name_ + "'";
+    message.reason = "the message is of type '" + std::string(decoded.envelope->type) +
+                     "', accepted is '" + name_ + "'";
+    return message;
   }
   const std::optional<std::size_t> added = AddedSince(decoded.envelope->md5);
-  if (!added) return "the sender knows another definition of '" + name_ + "' (different MD5)";
-  transport::ByteView payload = decoded.envelope->payload;
-  std::vector<std::uint8_t> whole;
-  if (*added > 0) {
-    whole.reserve(payload.size + *added);
-    whole.assign(payload.data, payload.data + payload.size);
-    whole.resize(payload.size + *added, 0);
-    payload = {whole.data(), whole.size()};
+  if (!added) {
+    message.reason = "the sender knows another definition of '" + name_ + "' (different MD5)";
+    return message;
   }
-  std::optional<std::string> fault = layout_.Check(payload);
-  if (fault) return fault;
-  Publish(publisher, payload, vehicle_id);
+  message.serialised = decoded.envelope->payload;
+  if (*added > 0) {
+    const transport::ByteView payload = decoded.envelope->payload;
+    message.completed.reserve(payload.size + *added);
+    message.completed.assign(payload.data, payload.data + payload.size);
+    message.completed.resize(payload.size + *added, 0);
+    message.serialised = {message.completed.data(), message.completed.size()};
+  }
+  message.reason = layout_.Check(message.serialised).value_or("");
+  return message;
+}
+
+std::optional<std::string> BridgedType::PublishChecked(const ros::Publisher& publisher,
+                                                       transport::ByteView bytes,
+                                                       const BridgeOrigin& origin) const {
+  DecodedBridgeMessage message = Decode(bytes);
+  if (!message.reason.empty()) return std::move(message.reason);
+  Publish(publisher, message.serialised, origin);
   return std::nullopt;
 }
 

@@ -19,6 +19,7 @@ namespace livemap::ros_io {
 struct OutgoingBridgeMessage {
   std::vector<std::uint8_t> envelope;
   std::string vehicle_id;  ///< The message's own field; empty where the type has none.
+  std::string zone;        ///< The same of the field `zone`, which the envelope does not have.
   /// Why every receiver would refuse the message (a field over its limit); it has no envelope then.
   std::optional<std::string> fault;
 };
@@ -30,7 +31,24 @@ struct EarlierDefinition {
   std::size_t added_bytes = 0;  ///< That the fields added since take, all of them of fixed size.
 };
 
+/// What a bridge writes into a message that comes in, whatever the message says itself.
+struct BridgeOrigin {
+  std::optional<std::string> vehicle_id;  ///< Nothing: the message's own stays.
+  std::string zone;                       ///< Id; empty on the zone's side.
+};
+
+/// The serialisation of a received message by the type's present definition.
+struct DecodedBridgeMessage {
+  transport::ByteView serialised;       ///< Points into the received bytes or into `completed`.
+  std::vector<std::uint8_t> completed;  ///< Empty where the sender's definition is the present one.
+  std::string reason;                   ///< Why there is none; empty when there is one.
+};
+
 /// One message type that the MQTT bridge can carry in both directions.
+///
+/// A last field `string zone` says on a vehicle to which zone a message goes or from which it
+/// comes. On the wire the topic says that: there the message travels by the definition without the
+/// field, which is the one that vehicles and zones knew before they had it.
 class BridgedType {
  public:
   using Send = std::function<void(OutgoingBridgeMessage)>;
@@ -47,31 +65,38 @@ class BridgedType {
   virtual ros::Publisher Advertise(ros::NodeHandle& handle, const std::string& topic,
                                    std::uint32_t queue_size) const = 0;
 
-  /// Publishes the message in untrusted MQTT bytes: envelope, type, definition and every length are
-  /// checked before anything is deserialised. When `vehicle_id` is given, the message's field
-  /// becomes that, whatever the bytes say. Returns why the bytes were refused, or nothing.
+  /// Reads untrusted MQTT bytes, which must outlive the result: envelope, type, definition and
+  /// every length are checked, so that the result can be deserialised.
+  DecodedBridgeMessage Decode(transport::ByteView bytes) const;
+  /// Publishes the message in untrusted MQTT bytes, after Decode, with the fields that `origin`
+  /// gives. Returns why the bytes were refused, or nothing.
   std::optional<std::string> PublishChecked(const ros::Publisher& publisher,
                                             transport::ByteView bytes,
-                                            const std::optional<std::string>& vehicle_id) const;
+                                            const BridgeOrigin& origin) const;
 
  protected:
-  BridgedType(std::string name, const std::string& md5, const std::string& definition,
-              std::size_t max_bytes, const transport::LayoutLimits& limits,
-              const std::vector<EarlierDefinition>& earlier);
+  /// `md5` is that of the definition. `md5_without_zone` is empty where that has no field `zone`;
+  /// the earlier ones have none.
+  BridgedType(std::string name, const std::string& md5, const std::string& md5_without_zone,
+              const std::string& definition, std::size_t max_bytes,
+              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier);
 
   std::optional<std::string> Check(transport::ByteView serialised) const;
-  std::vector<std::uint8_t> Enclose(const std::vector<std::uint8_t>& serialised) const;
+  /// `zone_size` is the length of the text in the field `zone`, where there is one.
+  std::vector<std::uint8_t> Enclose(const std::vector<std::uint8_t>& serialised,
+                                    std::size_t zone_size) const;
 
  private:
   /// `serialised` has passed all checks.
   virtual void Publish(const ros::Publisher& publisher, transport::ByteView serialised,
-                       const std::optional<std::string>& vehicle_id) const = 0;
+                       const BridgeOrigin& origin) const = 0;
 
   std::optional<std::size_t> AddedSince(const transport::Md5& md5) const;
 
   std::string name_;
-  transport::Md5 md5_;
-  std::vector<std::pair<transport::Md5, std::size_t>> earlier_;  // And what was added since, bytes.
+  transport::Md5 wire_md5_;
+  bool has_zone_;
+  std::vector<std::pair<transport::Md5, std::size_t>> known_;  // And what was added since, bytes.
   std::size_t max_bytes_;
   transport::MessageLayout layout_;
 };

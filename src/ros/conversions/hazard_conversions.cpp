@@ -42,6 +42,7 @@ HazardReport ToMessage(const protocol::Report& report) {
   message.shown_y = report.shown.y;
   message.shown_width = report.shown.width;
   message.shown_height = report.shown.height;
+  message.zone = report.zone;
   return message;
 }
 
@@ -63,6 +64,7 @@ protocol::Report FromMessage(const HazardReport& message) {
   report.image_frame_id = message.image.header.frame_id;
   report.image_format = message.image.format;
   report.image = message.image.data;
+  report.zone = message.zone;
   if (message.schema_version != kWholeImages) {
     report.shown = {message.shown_x, message.shown_y, message.shown_width, message.shown_height};
   }
@@ -79,6 +81,7 @@ ReportReceipt ToMessage(const protocol::Receipt& receipt) {
   message.hazard_uuid = ToBytes(receipt.hazard_uuid);
   message.vehicle_id = receipt.vehicle_id;
   message.reason = receipt.reason;
+  message.zone = receipt.zone;
   return message;
 }
 
@@ -100,6 +103,7 @@ protocol::Receipt FromMessage(const ReportReceipt& message) {
   receipt.hazard_uuid = ToUuid(message.hazard_uuid);
   receipt.vehicle_id = message.vehicle_id;
   receipt.reason = message.reason;
+  receipt.zone = message.zone;
   return receipt;
 }
 
@@ -187,6 +191,7 @@ HazardNotice ToMessage(const protocol::Notice& notice) {
   message.image.header.stamp = message.last_seen;
   message.image.format = notice.image_format;
   message.image.data = notice.image;
+  message.zone = notice.zone;
   return message;
 }
 
@@ -226,6 +231,7 @@ protocol::Notice FromMessage(const HazardNotice& message) {
   notice.told = message.told;
   notice.image_format = message.image.format;
   notice.image = message.image.data;
+  notice.zone = message.zone;
   return notice;
 }
 

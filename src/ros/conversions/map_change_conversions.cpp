@@ -21,6 +21,7 @@ MapChange ToMessage(const protocol::MapChangeReport& report) {
   message.latitude = report.position.latitude_deg;
   message.longitude = report.position.longitude_deg;
   message.covariance = ToArray(report.covariance_m2);
+  message.zone = report.zone;
   return message;
 }
 
@@ -43,6 +44,7 @@ protocol::MapChangeReport FromMessage(const MapChange& message) {
   report.missed = message.missed;
   report.position = {message.latitude, message.longitude};
   report.covariance_m2 = ToMatrix(message.covariance);
+  report.zone = message.zone;
   return report;
 }
 

@@ -38,6 +38,7 @@ HazardPoll ToMessage(const protocol::Poll& poll) {
   message.picture_kind =
       poll.picture == protocol::PollPicture::kCrop ? HazardPoll::CROP : HazardPoll::WHOLE_FRAME;
   message.max_picture_bytes = poll.max_picture_bytes;
+  message.zone = poll.zone;
   return message;
 }
 
@@ -55,6 +56,7 @@ protocol::Poll FromMessage(const HazardPoll& message) {
   poll.covariance_m2 = ToMatrix(message.covariance);
   poll.picture = PollPictureOf(message);
   poll.max_picture_bytes = message.max_picture_bytes;
+  poll.zone = message.zone;
   protocol::CheckPoll(poll);
   return poll;
 }
@@ -106,6 +108,7 @@ HazardPollAnswer ToMessage(const protocol::PollAnswer& answer) {
   message.image.header.stamp = message.stamp;
   message.image.format = answer.image_format;
   message.image.data = answer.image;
+  message.zone = answer.zone;
   return message;
 }
 
@@ -137,6 +140,7 @@ protocol::PollAnswer FromMessage(const HazardPollAnswer& message) {
   answer.course_rad = static_cast<double>(message.course);
   answer.image_format = message.image.format;
   answer.image = message.image.data;
+  answer.zone = message.zone;
   protocol::CheckAnswer(answer);
   return answer;
 }

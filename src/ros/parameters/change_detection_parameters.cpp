@@ -153,6 +153,7 @@ ChangeDetectionConfig ReadChangeDetectionConfig(ParameterReader& parameters, std
       "Whether the zone is told. Classical methods tell no classes and take parallax for change.");
   parameters.Read("tell_confidence", config.tell_confidence, {0, 1},
                   "Least confidence of an object that the zone is told of.");
+  ReadZoneParameters(parameters, config.zones);
   parameters.Section(
       "Position of the vehicle at the image's stamp",
       "The parameters are those of hazard_reporting. The camera's mounting comes from tf "

@@ -6,6 +6,7 @@
 
 #include "change/objects/change_detector.h"
 #include "ros/parameters/shared/parameter_reader.h"
+#include "ros/parameters/shared/shared_parameters.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
 namespace livemap::ros_io {
@@ -26,6 +27,7 @@ struct ChangeDetectionConfig {
   double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
   bool tell_zone = true;            ///< Objects that were passed, as MapChange.
   double tell_confidence = 0.5;     ///< Least, of these.
+  ZoneParameters zones;
   double diagnostics_period_s = 1.0;
   change::ChangeDetector::Config watch;
   vehicle::VehiclePoseLookup::Config pose;

@@ -40,6 +40,11 @@ void ReadReportingMap(ParameterReader& parameters, HazardReportingConfig& config
                   "Size of unfinished reports: pictures, and 1 kB each. Beyond it new hazards are "
                   "refused and counted.",
                   "bytes");
+  parameters.Section("Zones",
+                     "A report goes to the zone in which its hazard lies "
+                     "(docs/explanation/changing-zones.md).");
+  ReadZoneParameters(parameters, config.zones);
+  reporter.map.zone = config.zones.zone;
 }
 
 void ReadReportingSightings(ParameterReader& parameters, HazardReportingConfig& config) {

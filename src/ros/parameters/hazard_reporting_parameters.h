@@ -6,6 +6,7 @@
 #include "geo/wgs84.h"
 #include "perception/privacy/privacy_mask.h"
 #include "ros/parameters/shared/parameter_reader.h"
+#include "ros/parameters/shared/shared_parameters.h"
 #include "vehicle/pictures/picture_worker.h"
 #include "vehicle/polls/poll_responder.h"
 #include "vehicle/reporting/hazard_reporter.h"
@@ -15,6 +16,7 @@ namespace livemap::ros_io {
 /// Defaults of the hazard_reporting nodelet; the reader states their meanings.
 struct HazardReportingConfig {
   vehicle::HazardReporter::Config reporter;
+  ZoneParameters zones;
   vehicle::PollResponder::Config polls;
   vehicle::PictureWorker::Config pictures;
   int picture_frames = 64;  ///< Images that may be wanted.

@@ -225,6 +225,35 @@ void SetZoneBridgeDefaults(transport::MqttConfig& mqtt) {
   mqtt.queue_messages = 10000;
 }
 
+void ReadZoneHandover(ParameterReader& parameters, BridgeConfig& config) {
+  config.zones.zone = config.zone;
+  directory::ZoneHandover::Config& handover = config.handover;
+  parameters.Section("Changing zones",
+                     "With a zone directory a vehicle connects to the zone in which it is "
+                     "(docs/explanation/changing-zones.md). `zone`, `host` and `port` then are "
+                     "those of the zone where no directory counts or none of its zones is near.");
+  ReadZoneDirectory(parameters, config.zones);
+  parameters.Read("zone_hysteresis_m", handover.choice.hysteresis_m, {0, 10000},
+                  "The vehicle changes to another zone once it lies deeper in that by this.", "m");
+  parameters.Read("zone_max_gap_m", handover.choice.max_gap_m, {0, 100000},
+                  "A vehicle that no zone contains takes the nearest one within this distance.",
+                  "m");
+  parameters.Read("zone_near_m", handover.near_m, {0, 20000},
+                  "The vehicle is also connected to zones whose area is this near, and tells them "
+                  "where it is.",
+                  "m");
+  parameters.Read("zone_linger_s", handover.linger_s, {0, 3600},
+                  "A zone left behind stays connected for this time after the last message to it. "
+                  "It is longer than `resend_longest_s` of hazard_reporting.",
+                  "s");
+  parameters.Read("zone_longest_linger_s", handover.longest_linger_s, {0, 86400},
+                  "Longest such time while messages to the zone still wait.", "s");
+  int max_zones = static_cast<int>(handover.max_zones);
+  parameters.Read("zone_max_connections", max_zones, {1, 16},
+                  "Number of zones that are connected at the same time.");
+  handover.max_zones = static_cast<std::size_t>(max_zones);
+}
+
 }  // namespace
 
 BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
@@ -246,6 +275,7 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
                   "s");
   config.mqtt.tls = ReadMqttTlsOptions(parameters);
   ReadMqttConnection(parameters, config.mqtt);
+  if (config.role == BridgeRole::kVehicle) ReadZoneHandover(parameters, config);
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
   config.mqtt.client_id = config.user;

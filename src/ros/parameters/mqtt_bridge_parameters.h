@@ -3,7 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "directory/zone_handover.h"
 #include "ros/parameters/shared/parameter_reader.h"
+#include "ros/parameters/shared/shared_parameters.h"
 #include "transport/mqtt_client.h"
 
 namespace livemap::ros_io {
@@ -37,6 +39,9 @@ struct BridgeConfig {
   double password_wait_s = 10;  ///< For a broker that writes the file while we start.
   double diagnostics_period_s = 1;
   transport::MqttConfig mqtt;
+  /// Of a vehicle: how it changes zones, where there is a directory. `zones.zone` is `zone`.
+  ZoneParameters zones;
+  directory::ZoneHandover::Config handover;
   std::vector<BridgeTopic> topics;
 };
 

@@ -135,6 +135,7 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("broken_rows", reporter.map().broken_rows().count());
   status.add("map_sequence", reporter.map().map_sequence());
   status.add("notices_missing", reporter.map().has_gap());
+  status.add("zones_known", reporter.map().zone_count());
   status.add("forgotten_unannounced", counters.forgotten_unannounced);
   status.add("known", reporter.map().known_count());
   status.add("waiting_frames", reporter.waiting_frames());

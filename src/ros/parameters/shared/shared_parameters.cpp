@@ -2,6 +2,8 @@
 
 #include <ctime>
 
+#include "transport/topic_template.h"
+
 namespace livemap::ros_io {
 namespace {
 
@@ -29,6 +31,47 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns) {
                 " bytes, accepted are at most 64");
   }
   return drive_id;
+}
+
+void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones) {
+  parameters.Read(
+      "zone_directory", zones.directory,
+      "File of the authority's signed zone directory (docs/reference/zone-directory.md). Empty: "
+      "the vehicle stays with `zone`. vehicle.launch sets it by the argument `zone_directory`.");
+  parameters.Read("zone_authority", zones.authority,
+                  "Certificate of the authority that signs the directory, a PEM file. "
+                  "vehicle.launch sets it by the argument `zone_authority`.");
+  if (zones.directory.empty()) return;
+  if (zones.authority.empty()) {
+    throw Error(
+        "parameter 'zone_authority' is missing, which 'zone_directory' needs, accepted is "
+        "a PEM file with one certificate");
+  }
+  if (zones.zone.empty()) {
+    throw Error(
+        "parameter 'zone' is missing, which 'zone_directory' needs, accepted is the id of "
+        "a zone");
+  }
+}
+
+void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones) {
+  parameters.Read("zone", zones.zone,
+                  "Id of the configured zone, as in mqtt_bridge. All that names no zone belongs to "
+                  "it. Empty: there is one zone only, whatever its id. vehicle.launch sets it by "
+                  "the argument `zone`.");
+  if (!zones.zone.empty() && !transport::IsValidId(zones.zone)) {
+    throw Error("parameter 'zone' is '" + zones.zone +
+                "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
+  }
+  ReadZoneDirectory(parameters, zones);
+}
+
+std::shared_ptr<directory::ZoneLookup> MakeZoneLookup(const ZoneParameters& zones) {
+  if (zones.directory.empty()) return nullptr;
+  directory::ZoneLookup::Config config;
+  config.file = zones.directory;
+  return std::make_shared<directory::ZoneLookup>(
+      config, directory::TrustedAuthority::Read(zones.authority));
 }
 
 void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track) {

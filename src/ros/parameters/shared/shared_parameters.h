@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
+#include "directory/zone_lookup.h"
 #include "geo/ground_projection.h"
 #include "perception/privacy/privacy_mask.h"
 #include "ros/parameters/shared/parameter_reader.h"
@@ -15,6 +17,23 @@ namespace livemap::ros_io {
 
 /// `drive_id`; where none is given, one made of `now_ns` (UTC). Throws Error when it is too long.
 std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns);
+
+/// The zones of a vehicle.
+struct ZoneParameters {
+  std::string zone;       ///< Id of the configured one; empty: there is one zone only.
+  std::string directory;  ///< File of the signed zone directory; empty: none is used.
+  std::string authority;  ///< File with the certificate of who signed it.
+};
+
+/// `zone_directory` and `zone_authority`, beside `zone` that `zones` has already. Throws Error when
+/// one is missing that another one needs.
+void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones);
+/// The same with `zone`.
+void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones);
+
+/// Finds the zone of a place by the zone directory; null where none is used. Throws Error when the
+/// authority's certificate cannot be read.
+std::shared_ptr<directory::ZoneLookup> MakeZoneLookup(const ZoneParameters& zones);
 
 /// How position and course are made of the fixes.
 void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track);

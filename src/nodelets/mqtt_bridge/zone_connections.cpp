@@ -1,0 +1,72 @@
+#include "nodelets/mqtt_bridge/zone_connections.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace livemap::nodelets {
+
+ZoneConnections::ZoneConnections(transport::MqttConfig config, SubscriptionsOf subscriptions_of,
+                                 Events events)
+    : config_(std::move(config)),
+      subscriptions_of_(std::move(subscriptions_of)),
+      events_(std::move(events)) {}
+
+void ZoneConnections::Keep(const std::vector<Zone>& zones) {
+  const auto is_kept = [&zones](const auto& connection) {
+    return std::any_of(zones.begin(), zones.end(), [&connection](const Zone& zone) {
+      return zone.id == connection.first && zone.brokers == connection.second.brokers;
+    });
+  };
+  for (auto connection = connections_.begin(); connection != connections_.end();) {
+    connection = is_kept(*connection) ? std::next(connection) : connections_.erase(connection);
+  }
+  for (const Zone& zone : zones) {
+    if (connections_.count(zone.id) != 0) continue;
+    connections_[zone.id] = {zone.brokers, Connect(zone)};
+  }
+}
+
+std::unique_ptr<transport::MqttClient> ZoneConnections::Connect(const Zone& zone) const {
+  transport::MqttConfig config = config_;
+  config.host = zone.brokers.front().host;
+  config.port = zone.brokers.front().port;
+  config.fallbacks.assign(zone.brokers.begin() + 1, zone.brokers.end());
+  transport::MqttCallbacks callbacks;
+  callbacks.on_published = events_.on_published;
+  if (events_.on_message) {
+    callbacks.on_message = [this, id = zone.id](const transport::MqttMessage& message) {
+      events_.on_message(id, message);
+    };
+  }
+  if (events_.on_connection) {
+    callbacks.on_connection = [this, id = zone.id](bool connected, const std::string& reason) {
+      events_.on_connection(id, connected, reason);
+    };
+  }
+  return std::make_unique<transport::MqttClient>(config, subscriptions_of_(zone.id),
+                                                 std::move(callbacks));
+}
+
+transport::MqttClient* ZoneConnections::Find(const std::string& zone) const {
+  const auto found = connections_.find(zone);
+  return found == connections_.end() ? nullptr : found->second.client.get();
+}
+
+std::vector<std::string> ZoneConnections::Waiting() const {
+  std::vector<std::string> zones;
+  for (const auto& [zone, connection] : connections_) {
+    const transport::MqttStatistics statistics = connection.client->statistics();
+    if (statistics.queued + statistics.inflight > 0) zones.push_back(zone);
+  }
+  return zones;
+}
+
+std::map<std::string, transport::MqttStatistics> ZoneConnections::Statistics() const {
+  std::map<std::string, transport::MqttStatistics> statistics;
+  for (const auto& [zone, connection] : connections_) {
+    statistics[zone] = connection.client->statistics();
+  }
+  return statistics;
+}
+
+}  // namespace livemap::nodelets

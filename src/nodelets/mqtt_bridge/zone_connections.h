@@ -1,0 +1,70 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "transport/mqtt_client.h"
+
+namespace livemap::nodelets {
+
+/// The bridge's connections to brokers, one for each zone. Not thread-safe; what it calls, it calls
+/// on the network threads of the connections.
+///
+/// Typical usage:
+///
+///     ZoneConnections connections(config.mqtt, subscriptions_of, events);
+///     connections.Keep({{"centre", {{"centre.example.org", 8883}}}});
+///     if (transport::MqttClient* client = connections.Find("centre")) client->Publish(...);
+class ZoneConnections {
+ public:
+  /// A zone and where its broker is: the first address that answers is taken.
+  struct Zone {
+    std::string id;
+    std::vector<transport::MqttAddress> brokers;  ///< At least one.
+  };
+
+  /// As transport::MqttCallbacks, with the id of the zone. Functions that are empty are not called.
+  struct Events {
+    std::function<void(const std::string& zone, const transport::MqttMessage&)> on_message;
+    std::function<void(const transport::MqttPublishOutcome&)> on_published;
+    std::function<void(const std::string& zone, bool connected, const std::string& reason)>
+        on_connection;
+  };
+
+  /// What a connection to the zone with this id subscribes to.
+  using SubscriptionsOf =
+      std::function<std::vector<transport::MqttSubscription>(const std::string&)>;
+
+  /// `config` is that of each connection but for the broker's address.
+  ZoneConnections(transport::MqttConfig config, SubscriptionsOf subscriptions_of, Events events);
+
+  /// Connects to `zones` and ends all other connections. Those that stand stay, unless their
+  /// brokers have changed; then what waits there is lost. Ending one may take as long as
+  /// ~MqttClient. Throws Error naming a bad option.
+  void Keep(const std::vector<Zone>& zones);
+
+  /// The connection to a zone; null: there is none.
+  transport::MqttClient* Find(const std::string& zone) const;
+  /// Ids of the zones for which messages wait to be sent or to be answered.
+  std::vector<std::string> Waiting() const;
+  /// Of each connection, by the zone's id.
+  std::map<std::string, transport::MqttStatistics> Statistics() const;
+
+ private:
+  struct Connection {
+    std::vector<transport::MqttAddress> brokers;
+    std::unique_ptr<transport::MqttClient> client;
+  };
+
+  std::unique_ptr<transport::MqttClient> Connect(const Zone& zone) const;
+
+  const transport::MqttConfig config_;
+  const SubscriptionsOf subscriptions_of_;
+  const Events events_;
+  std::map<std::string, Connection> connections_;
+};
+
+}  // namespace livemap::nodelets
