@@ -231,7 +231,8 @@ void ReadZoneHandover(ParameterReader& parameters, BridgeConfig& config) {
   parameters.Section("Changing zones",
                      "With a zone directory a vehicle connects to the zone in which it is "
                      "(docs/explanation/changing-zones.md). `zone`, `host` and `port` then are "
-                     "those of the zone where no directory counts or none of its zones is near.");
+                     "those of the zone until the first position comes, and where no directory "
+                     "counts.");
   ReadZoneDirectory(parameters, config.zones);
   parameters.Read("zone_hysteresis_m", handover.choice.hysteresis_m, {0, 10000},
                   "The vehicle changes to another zone once it lies deeper in that by this.", "m");
