@@ -31,6 +31,12 @@ constexpr double kWorstStartSigma = 0.5;
 /// have been another one by so much, m/s.
 constexpr double kLeastShareOfStart = 0.5;
 constexpr double kGapSigmaMps = 0.5;
+/// A camera that has moved less since the last check, shares of the start's motion and rad, sees
+/// nothing new of it.
+constexpr double kCheckedMove = 0.1;
+constexpr double kCheckedTurnRad = 0.01;
+/// A path of which the distance from its beginning is a smaller share is no straight way.
+constexpr double kLeastStraightness = 0.9;
 
 /// A motion with its translation times `factor`.
 Eigen::Isometry3d StretchedMonocularMotion(Eigen::Isometry3d motion, double factor) {
@@ -90,7 +96,7 @@ void MonocularOdometry::Reset() {
   fixes_.Reset();
   travel_.Reset();
   learner_.Clear();
-  started_ = lost_ = false;
+  started_ = lost_ = keeps_start_ = false;
   source_ = MetresSource::kNone;
   shared_sigma_ = 0;
   log_height_.reset();
@@ -208,6 +214,7 @@ VoResult MonocularOdometry::Start(const MonocularFrame& frame) {
   const Eigen::Isometry3d first_from_new =
       StretchedMonocularMotion(direction->inverse(), way_m.value_or(1.0));
   const double step_s = Seconds(frame.stamp_ns - first_stamp_ns_);
+  start_units_ = first_from_new.translation().norm();
   if (!MakeFirstKeyframe(first_from_new, Se3Log(first_from_new) / step_s)) {
     BeginStart(frame);
     return result;
@@ -251,12 +258,22 @@ std::optional<double> MonocularOdometry::WayOfStart(const MonocularFrame& frame)
 /// frame's pose is.
 std::optional<VoResult> MonocularOdometry::CheckStart(const MonocularFrame& frame,
                                                       const VoResult& unscaled) {
-  if (!start_.IsProvisional()) return std::nullopt;
+  if (!start_.IsProvisional() || keeps_start_) return std::nullopt;
+  start_units_ += (last_unscaled_.inverse() * unscaled.world_from_camera).translation().norm();
   const double unit = map_from_first_.translation().norm();
   const Eigen::Isometry3d new_from_first =
       StretchedMonocularMotion(unscaled.world_from_camera.inverse() * map_from_first_, 1 / unit);
+  // A camera that stands says nothing of the start.
+  const Eigen::Isometry3d moved = new_from_first * checked_from_first_.inverse();
+  if ((new_from_first.translation() - checked_from_first_.translation()).norm() < kCheckedMove &&
+      Eigen::AngleAxisd(moved.linear()).angle() < kCheckedTurnRad) {
+    return std::nullopt;
+  }
+  checked_from_first_ = new_from_first;
   switch (start_.Check(odometry_.images()[0], new_from_first)) {
     case TwoViewStart::Verdict::kRemake:
+      // No frame waits for the thread that makes keyframes: a later one says so again.
+      if (worker_ && worker_->busy()) break;
       return RemakeStart(frame, unscaled);
     case TwoViewStart::Verdict::kFails:
       return GiveUp(frame);
@@ -281,15 +298,21 @@ std::optional<VoResult> MonocularOdometry::RemakeStart(const MonocularFrame& fra
   const Eigen::Isometry3d step = last_unscaled_.inverse() * unscaled.world_from_camera;
   VoResult result = InMetres(frame, unscaled);
   scale_.Reset();
-  const std::optional<double> way_m = WayOfStart(frame);
+  // The speed of a stop is noise, and a way there and back is longer than its distance.
+  const bool is_straight_way = start_way_.m >= config_.min_speed_mps * start_way_.s &&
+                               units >= kLeastStraightness * start_units_;
+  const std::optional<double> way_m = is_straight_way ? WayOfStart(frame) : std::nullopt;
   if (!way_m && sigma) scale_.Measure(scale, scale * std::hypot(*sigma, depth_sigma), 1);
   // Where nobody knows metres, depths are looked for in units of the baseline.
   const double stretch = way_m.value_or(sigma ? units : 1.0) / units;
   std::optional<Vector6d> twist = unscaled.twist;
   if (twist) twist->head<3>() *= stretch;
+  start_units_ *= stretch;
   odometry_.Reset();
   odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
   if (!MakeFirstKeyframe(StretchedMonocularMotion(direction->inverse(), units * stretch), twist)) {
+    // In a place of few edges each start would be made anew and lost.
+    keeps_start_ = true;
     return GiveUp(frame);
   }
   if (way_m || !sigma) {
@@ -321,7 +344,7 @@ VoResult MonocularOdometry::GiveUp(const MonocularFrame& frame) {
   lost_ = true;
   lost_since_ns_ = frame.stamp_ns;
   fixes_.Reset();
-  last_.state = VoState::kLost;
+  if (last_.state != VoState::kInitialising) last_.state = VoState::kLost;  // A path has begun.
   const VoResult held = Held(frame);
   BeginStart(frame);
   return held;
@@ -333,6 +356,8 @@ bool MonocularOdometry::MakeFirstKeyframe(const Eigen::Isometry3d& first_from_ne
                                           const std::optional<Vector6d>& twist) {
   if (worker_) worker_->Cancel();
   map_from_first_ = first_from_new.inverse();
+  checked_from_first_ =
+      StretchedMonocularMotion(map_from_first_, 1 / map_from_first_.translation().norm());
   last_unscaled_ = Eigen::Isometry3d::Identity();
   ForgetWay();
   learner_.Restart(start_.first(), map_from_first_);
@@ -352,7 +377,10 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
     ForgetWay();
     fixes_.Reset();
     VoResult held = InMetres(frame, unscaled);
-    if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
+    if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) {
+      keeps_start_ = false;
+      BeginStart(frame);
+    }
     return held;
   }
   lost_ = false;

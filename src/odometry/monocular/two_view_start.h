@@ -110,8 +110,10 @@ class TwoViewStart {
   std::vector<cv::Point2f> begin_, second_, end_;
   bool provisional_ = false;
   Eigen::Isometry3d second_from_first_ = Eigen::Isometry3d::Identity();
-  double parallax_px_ = 0;                // Of the second image.
-  int agreeing_ = 0, contradicting_ = 0;  // Images after the second.
+  double parallax_px_ = 0;  // Of the second image.
+  double tried_px_ = 0;     // Of the last pair that showed no motion.
+  int agreeing_ = 0;        // Images after the second.
+  int contradicting_ = 0;   // Of those, the last ones in a row.
 };
 
 }  // namespace livemap::odometry
