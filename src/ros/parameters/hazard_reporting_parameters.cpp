@@ -44,7 +44,8 @@ void ReadReportingMap(ParameterReader& parameters, HazardReportingConfig& config
                      "A report goes to the zone in which its hazard lies "
                      "(docs/explanation/changing-zones.md).");
   ReadZoneParameters(parameters, config.zones);
-  reporter.map.zone = config.zones.zone;
+  // Without a directory there is one zone, whatever it is called.
+  if (!config.zones.directory.empty()) reporter.map.zone = config.zones.zone;
 }
 
 void ReadReportingSightings(ParameterReader& parameters, HazardReportingConfig& config) {

@@ -102,15 +102,19 @@ std::set<std::string> AnnouncedHazards::ZonesBegunAnew(const StoredHazards& stor
 AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
   Changes changes;
   const std::set<std::string> anew = ZonesBegunAnew(stored);
+  // A map that knows one zone only names none.
+  const auto is_anew = [&anew](const std::string& zone) {
+    return anew.count(zone) != 0 || anew.count("") != 0;
+  };
   stored_sequences_ = stored.sequences;
   for (auto gone = gone_.begin(); gone != gone_.end();) {
-    gone = anew.count(gone->second.zone) != 0 ? gone_.erase(gone) : std::next(gone);
+    gone = is_anew(gone->second.zone) ? gone_.erase(gone) : std::next(gone);
   }
   std::unordered_set<Uuid> in_map;
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
     const Word word{row.zone, row.sequence};
-    if (anew.count(row.zone) == 0 && IsOld(row.hazard.id, word)) continue;
+    if (!is_anew(row.zone) && IsOld(row.hazard.id, word)) continue;
     there_[row.hazard.id] = word;
     changes.put.push_back(row.hazard);
   }
@@ -121,8 +125,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
     if (taken_in == stored.sequences.end()) taken_in = stored.sequences.find("");
     const bool is_taken_in =
         taken_in != stored.sequences.end() && word.sequence <= taken_in->second;
-    const bool gone =
-        in_map.count(there->first) == 0 && (anew.count(word.zone) != 0 || is_taken_in);
+    const bool gone = in_map.count(there->first) == 0 && (is_anew(word.zone) || is_taken_in);
     if (gone) changes.gone.push_back(there->first);
     there = gone ? there_.erase(there) : std::next(there);
   }

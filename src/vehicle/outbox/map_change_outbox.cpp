@@ -94,7 +94,9 @@ std::string MapChangeOutbox::ZoneOf(const std::string& named) const {
 }
 
 void MapChangeOutbox::Load(double steady_s) {
-  if (!config_.zone.empty()) {
+  if (config_.zone.empty()) {
+    database_->Execute("UPDATE pending SET zone='' WHERE zone<>''");
+  } else {
     database_->Prepare("UPDATE pending SET zone=? WHERE zone=''").Bind(1, config_.zone).Execute();
   }
   // Of a text that something else made endless only the beginning is fetched: too long as it is.

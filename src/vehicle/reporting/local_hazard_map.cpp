@@ -85,7 +85,16 @@ std::string LocalHazardMap::ZoneOf(const std::string& named) const {
 }
 
 void LocalHazardMap::GiveRowsTheirZone() {
-  if (config_.zone.empty()) return;
+  if (config_.zone.empty()) {
+    // There is one zone now, which has all of it or tells what is gone.
+    database_->Transaction([&] {
+      database_->Execute(
+          "UPDATE known SET zone='', sequence=min(sequence,1) WHERE zone<>'';"
+          "UPDATE pending SET zone='' WHERE zone<>'';"
+          "DELETE FROM gone WHERE zone<>''; DELETE FROM zones WHERE zone<>'';");
+    });
+    return;
+  }
   database_->Transaction([&] {
     for (const char* table : {"known", "pending", "gone", "zones"}) {
       // Where the zone has a row of its own, that is the newer one.
@@ -361,12 +370,13 @@ bool LocalHazardMap::ApplyNotice(const protocol::Notice& notice, const std::stri
     memory.told.clear();
     return is_complete;
   }
-  if (IsOfAnotherZone(notice.hazard_uuid, zone)) return false;
   if (notice.vehicle_id.empty()) {
     memory.chain.Add(notice.previous_sequence, notice.sequence);
   } else if (memory.told.size() < kMaxTold) {
     memory.told.insert(notice.hazard_uuid);
   }
+  // It came, though it counts for nothing: else its zone would tell it again and again.
+  if (IsOfAnotherZone(notice.hazard_uuid, zone)) return false;
   if (!IsNews(notice, zone)) return true;
   StoreNotice(notice, zone);
   changes.push_back({notice.hazard_uuid, notice.action != protocol::Notice::Action::kRemoved,

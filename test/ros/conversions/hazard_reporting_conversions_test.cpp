@@ -97,13 +97,14 @@ TEST(HazardConversions, TheLinkIsWhatItsMessageSaysAndNothingElse) {
 TEST(HazardConversions, ReceiptSurvivesTheWayThroughItsMessage) {
   for (const auto status :
        {protocol::Receipt::Status::kCommitted, protocol::Receipt::Status::kRefused}) {
-    const protocol::Receipt receipt{status, Id(1), Id(2), "car-1", "because"};
+    const protocol::Receipt receipt{status, Id(1), Id(2), "car-1", "because", "west"};
     const protocol::Receipt back = FromMessage(ToMessage(receipt));
     EXPECT_EQ(back.status, status);
     EXPECT_EQ(back.report_uuid, Id(1));
     EXPECT_EQ(back.hazard_uuid, Id(2));
     EXPECT_EQ(back.vehicle_id, "car-1");
     EXPECT_EQ(back.reason, "because");
+    EXPECT_EQ(back.zone, "west");
   }
 }
 

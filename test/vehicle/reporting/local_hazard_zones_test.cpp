@@ -94,7 +94,8 @@ TEST_F(LocalHazardZones, NoZoneMovesOrRemovesAHazardOfAnother) {
                          OfZone("east", Action::kRemoved, 1, 0, 70, 71)}),
             2U);
   EXPECT_TRUE(map_->Find("pothole", kStreet));
-  EXPECT_EQ(map_->map_sequence("east"), 0U);
+  // They came, all the same: east need not tell them again.
+  EXPECT_EQ(map_->map_sequence("east"), 71U);
 }
 
 TEST_F(LocalHazardZones, ATellingOfAllTakesAwayWhatItsOwnZoneNoLongerHas) {
@@ -144,6 +145,21 @@ TEST_F(LocalHazardZones, WhatAnOlderProgramLeftBelongsToTheConfiguredZone) {
   config_.zone = "south";
   Restart();
   EXPECT_EQ(map_->LoadPending(Id(1))->zone, "north") << "a row keeps its zone";
+}
+
+TEST_F(LocalHazardZones, WithoutADirectoryAnyMoreTheOneZoneTakesWhatWaitsAndTellsItsHazardsAgain) {
+  protocol::Report report = MakeReport(1, kStreet);
+  report.zone = "east";
+  map_->Add(report);
+  map_->Apply({OfZone("west", Action::kAdded, 2, 100, 0, 400)});
+  config_.zone.clear();
+  Restart();
+  EXPECT_EQ(map_->LoadPending(Id(1))->zone, "");
+  EXPECT_EQ(map_->map_sequence(), 0U) << "of a zone that counts for itself";
+  EXPECT_EQ(map_->Apply({OfZone("city", Action::kUpdated, 2, 120, 0, 7)}), 0U);
+  EXPECT_TRUE(map_->Find("pothole", East(120)));
+  EXPECT_TRUE(map_->Apply(CommittedBy("city", 1, 9)));
+  EXPECT_EQ(map_->pending_count(), 0U);
 }
 
 TEST_F(LocalHazardZones, WithoutAConfiguredZoneThereIsOneWhateverItsId) {
