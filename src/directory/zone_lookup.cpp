@@ -15,7 +15,12 @@ void ZoneLookup::ReadAgainIfChanged() {
   // A file that is gone says nothing against what it said.
   if (missing || (keeper_ && time == read_time_)) return;
   read_time_ = time;
-  keeper_ = std::make_unique<DirectoryKeeper>(authority_, config_.file, now_ns_);
+  auto next = std::make_unique<DirectoryKeeper>(authority_, config_.file, now_ns_);
+  // A file that is half written, or older, says nothing against what it said either.
+  const auto before = keeper_ ? keeper_->directory() : nullptr;
+  const auto after = next->directory();
+  if (before && (!after || after->version() < before->version())) return;
+  keeper_ = std::move(next);
 }
 
 std::string ZoneLookup::IdAt(const geo::GeoPoint& point) {

@@ -186,10 +186,15 @@ class MqttBridgePart : public NodeletPart {
     std::error_code missing;
     const auto time = std::filesystem::last_write_time(config_.zones.directory, missing);
     if (keeper_ && (missing || time == directory_time_)) return;
-    directory_time_ = time;
-    keeper_ = std::make_unique<directory::DirectoryKeeper>(
+    auto next = std::make_unique<directory::DirectoryKeeper>(
         directory::TrustedAuthority::Read(config_.zones.authority), config_.zones.directory);
-    if (!keeper_->damage().empty()) NODELET_ERROR("%s", keeper_->damage().c_str());
+    directory_time_ = time;
+    if (!next->damage().empty()) NODELET_ERROR("%s", next->damage().c_str());
+    // One that is half written, or older, takes nothing away from the one before.
+    const auto before = keeper_ ? keeper_->directory() : nullptr;
+    const auto after = next->directory();
+    if (before && (!after || after->version() < before->version())) return;
+    keeper_ = std::move(next);
   }
 
   void StayWithConfiguredZone() {
@@ -218,10 +223,23 @@ class MqttBridgePart : public NodeletPart {
 
   void ConnectToZones() {
     const auto directory = keeper_->directory();
-    if (!directory && handover_->present() != config_.zone) StayWithConfiguredZone();
+    // A zone that the directory no longer has may have no broker.
+    const bool is_known = directory && (handover_->present() == config_.zone ||
+                                        directory->FindId(handover_->present()));
+    if (!is_known && handover_->near() != std::vector<std::string>{config_.zone}) {
+      StayWithConfiguredZone();
+    }
     std::vector<ZoneConnections::Zone> zones;
     for (const std::string& id : handover_->Wanted(SteadyS(), connections_->Waiting())) {
-      if (auto zone = FindZone(id, directory.get())) zones.push_back(std::move(*zone));
+      auto zone = FindZone(id, directory.get());
+      // A broker keeps one connection of a user: a second one would end the first.
+      const auto shares_broker = [&zone](const ZoneConnections::Zone& other) {
+        return std::find_first_of(other.brokers.begin(), other.brokers.end(), zone->brokers.begin(),
+                                  zone->brokers.end()) != other.brokers.end();
+      };
+      if (zone && std::none_of(zones.begin(), zones.end(), shares_broker)) {
+        zones.push_back(std::move(*zone));
+      }
     }
     connections_->Keep(zones);
     if (told_zones_ == handover_->near()) return;

@@ -1,6 +1,8 @@
 #include "nodelets/mqtt_bridge/zone_connections.h"
 
 #include <algorithm>
+#include <chrono>
+#include <future>
 #include <utility>
 
 namespace livemap::nodelets {
@@ -18,8 +20,22 @@ void ZoneConnections::Keep(const std::vector<Zone>& zones) {
     });
   };
   for (auto connection = connections_.begin(); connection != connections_.end();) {
-    connection = is_kept(*connection) ? std::next(connection) : connections_.erase(connection);
+    if (is_kept(*connection)) {
+      ++connection;
+      continue;
+    }
+    // A client that looks up a name ends when that has ended, seconds later where nobody answers.
+    ending_.push_back(
+        std::async(std::launch::async,
+                   [client = std::move(connection->second.client)]() mutable { client.reset(); }));
+    connection = connections_.erase(connection);
   }
+  ending_.erase(std::remove_if(ending_.begin(), ending_.end(),
+                               [](const std::future<void>& end) {
+                                 return end.wait_for(std::chrono::seconds(0)) ==
+                                        std::future_status::ready;
+                               }),
+                ending_.end());
   for (const Zone& zone : zones) {
     if (connections_.count(zone.id) != 0) continue;
     connections_[zone.id] = {zone.brokers, Connect(zone)};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <string>
@@ -42,8 +43,8 @@ class ZoneConnections {
   ZoneConnections(transport::MqttConfig config, SubscriptionsOf subscriptions_of, Events events);
 
   /// Connects to `zones` and ends all other connections. Those that stand stay, unless their
-  /// brokers have changed; then what waits there is lost. Ending one may take as long as
-  /// ~MqttClient. Throws Error naming a bad option.
+  /// brokers have changed; then what waits there is lost. One that ends may do so
+  /// after this returns. Throws Error naming a bad option.
   void Keep(const std::vector<Zone>& zones);
 
   /// The connection to a zone; null: there is none.
@@ -65,6 +66,7 @@ class ZoneConnections {
   const SubscriptionsOf subscriptions_of_;
   const Events events_;
   std::map<std::string, Connection> connections_;
+  std::vector<std::future<void>> ending_;  ///< Last: what ends still calls events_.
 };
 
 }  // namespace livemap::nodelets
