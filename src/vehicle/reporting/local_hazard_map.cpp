@@ -71,8 +71,8 @@ LocalHazardMap::LocalHazardMap(const Config& config, const protocol::HazardCatal
     : config_(config), catalogue_(catalogue), filter_(catalogue) {
   set_aside_ =
       OpenOrQuarantine(config_.path, LocalHazardMapMigrations(), now_ns, database_, [this] {
-        GiveRowsTheirZone();
         broken_rows_ = RepairTables(*database_);
+        GiveRowsTheirZone();
         LoadFilter();
       });
   if (!set_aside_.empty()) RecoverFromSetAside();
