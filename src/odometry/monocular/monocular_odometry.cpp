@@ -96,7 +96,7 @@ void MonocularOdometry::Reset() {
   fixes_.Reset();
   travel_.Reset();
   learner_.Clear();
-  started_ = lost_ = keeps_start_ = false;
+  started_ = lost_ = false;
   source_ = MetresSource::kNone;
   shared_sigma_ = 0;
   log_height_.reset();
@@ -258,7 +258,7 @@ std::optional<double> MonocularOdometry::WayOfStart(const MonocularFrame& frame)
 /// frame's pose is.
 std::optional<VoResult> MonocularOdometry::CheckStart(const MonocularFrame& frame,
                                                       const VoResult& unscaled) {
-  if (!start_.IsProvisional() || keeps_start_) return std::nullopt;
+  if (!start_.IsProvisional()) return std::nullopt;
   start_units_ += (last_unscaled_.inverse() * unscaled.world_from_camera).translation().norm();
   const double unit = map_from_first_.translation().norm();
   const Eigen::Isometry3d new_from_first =
@@ -311,8 +311,6 @@ std::optional<VoResult> MonocularOdometry::RemakeStart(const MonocularFrame& fra
   odometry_.Reset();
   odometry_.Track({frame.stamp_ns, frame.grey, {}, 1});
   if (!MakeFirstKeyframe(StretchedMonocularMotion(direction->inverse(), units * stretch), twist)) {
-    // In a place of few edges each start would be made anew and lost.
-    keeps_start_ = true;
     return GiveUp(frame);
   }
   if (way_m || !sigma) {
@@ -377,10 +375,7 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
     ForgetWay();
     fixes_.Reset();
     VoResult held = InMetres(frame, unscaled);
-    if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) {
-      keeps_start_ = false;
-      BeginStart(frame);
-    }
+    if (Seconds(frame.stamp_ns - lost_since_ns_) >= config_.give_up_s) BeginStart(frame);
     return held;
   }
   lost_ = false;

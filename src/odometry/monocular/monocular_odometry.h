@@ -160,11 +160,10 @@ class MonocularOdometry {
   ImagePyramid start_images_;
   bool started_ = false;
   bool lost_ = false;
-  bool keeps_start_ = false;  // One that was made anew showed too few edges: the next one stays.
-  Way way_;                   // Since the last measurement of the scale.
-  double way_units_ = 0;      // By visual odometry, since then.
-  Way start_way_;             // Since the start's first frame.
-  double start_units_ = 0;    // By visual odometry, since then.
+  Way way_;                 // Since the last measurement of the scale.
+  double way_units_ = 0;    // By visual odometry, since then.
+  Way start_way_;           // Since the start's first frame.
+  double start_units_ = 0;  // By visual odometry, since then.
   // Of the start's first frame: in the map, and on the path where metres were known.
   Eigen::Isometry3d map_from_first_ = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Isometry3d> world_from_first_;

@@ -99,7 +99,6 @@ void TwoViewStart::TakePair(const Eigen::Isometry3d& second_from_first) {
   second_from_first_ = second_from_first;
   parallax_px_ = MedianParallaxPx();
   agreeing_ = contradicting_ = 0;
-  tried_px_ = 0;
   provisional_ = true;
 }
 
@@ -120,15 +119,14 @@ TwoViewStart::Verdict TwoViewStart::Check(const cv::Mat& grey,
     ++contradicting_;
   } else {
     ++agreeing_;
-    contradicting_ = 0;  // A wrong start is contradicted by every image.
+    contradicting_ = std::max(0, contradicting_ - 1);
   }
   const double parallax_px = MedianParallaxPx();
   const bool certain = DepthSigma() <= config_.enough_depth_sigma;
-  const bool is_new_pair = parallax_px > kLonger * tried_px_;
-  if (is_new_pair && contradicting_ >= kImagesThatTell && parallax_px > kLonger * parallax_px_) {
+  if (contradicting_ >= kImagesThatTell && parallax_px > kLonger * parallax_px_) {
     return Verdict::kRemake;
   }
-  if (is_new_pair && !certain && parallax_px >= kMuchLonger * parallax_px_) return Verdict::kRemake;
+  if (!certain && parallax_px >= kMuchLonger * parallax_px_) return Verdict::kRemake;
   if (certain && agreeing_ >= kImagesThatTell && contradicting_ < kImagesThatTell) {
     provisional_ = false;
     return Verdict::kHolds;
@@ -138,11 +136,7 @@ TwoViewStart::Verdict TwoViewStart::Check(const cv::Mat& grey,
 
 std::optional<Eigen::Isometry3d> TwoViewStart::Remake() {
   const std::optional<Eigen::Isometry3d> motion = Motion();
-  if (motion) {
-    TakePair(*motion);
-  } else {
-    tried_px_ = MedianParallaxPx();
-  }
+  if (motion) TakePair(*motion);
   return motion;
 }
 

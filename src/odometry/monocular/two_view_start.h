@@ -111,9 +111,8 @@ class TwoViewStart {
   bool provisional_ = false;
   Eigen::Isometry3d second_from_first_ = Eigen::Isometry3d::Identity();
   double parallax_px_ = 0;  // Of the second image.
-  double tried_px_ = 0;     // Of the last pair that showed no motion.
   int agreeing_ = 0;        // Images after the second.
-  int contradicting_ = 0;   // Of those, the last ones in a row.
+  int contradicting_ = 0;   // Of those, less one for each that agrees since.
 };
 
 }  // namespace livemap::odometry
