@@ -150,11 +150,11 @@ TEST_F(MqttTlsTest, NamesATornFileAndGoesOnWhenItIsWhole) {
          {whole.substr(0, whole.size() / 2), std::string(whole.size(), '\0'), std::string()}) {
       std::ofstream(path, std::ios::binary) << torn;
       const MqttClient car(options, {}, {});
-      EXPECT_TRUE(Eventually([&, file = path, member = std::string(name)] {
+      ASSERT_TRUE(Eventually([&, file = path, member = std::string(name)] {
         return Says(car, file + ", the bridge's " + member + ", is torn or no PEM file");
       })) << car.statistics().last_error;
       std::ofstream(path, std::ios::binary) << whole;
-      EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+      ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
     }
   }
 }
