@@ -220,7 +220,7 @@ class DirectoryReader {
     constexpr std::string_view kHostCharacters =
         "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-:";
     const Json& value = Member(broker, "host");
-    const std::string host = value.is_string() ? value.get<std::string>() : "";
+    std::string host = value.is_string() ? value.get<std::string>() : "";
     const bool is_host = !host.empty() && host.size() <= kMaxHostBytes && host.front() != '-' &&
                          host.find_first_not_of(kHostCharacters) == std::string::npos;
     if (!is_host) Refuse("'host' is " + Shown(value), "a host name or an IP address");
@@ -239,7 +239,7 @@ class DirectoryReader {
   std::string ReadFingerprint(const Json& broker) const {
     const auto value = broker.find("fingerprint");
     if (value == broker.end() || value->is_null()) return "";
-    const std::string text = value->is_string() ? value->get<std::string>() : "";
+    std::string text = value->is_string() ? value->get<std::string>() : "";
     if (text.size() != 64 || text.find_first_not_of("0123456789abcdef") != std::string::npos) {
       Refuse("'fingerprint' is " + Shown(*value), "64 hex digits in lower case (SHA-256)");
     }
