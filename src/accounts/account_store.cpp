@@ -335,7 +335,7 @@ std::optional<Person> AccountStore::CheckPassword(const std::string& name,
 }
 
 std::string AccountStore::OpenSession(const std::string& name, std::int64_t now_ns) {
-  const std::string token = RandomHex(kTokenBytes);
+  std::string token = RandomHex(kTokenBytes);
   const MutexLock lock(mutex_);
   database_->Transaction([&] {
     mutex_.AssertHeld();

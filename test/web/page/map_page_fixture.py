@@ -41,7 +41,7 @@ class ZoneProcess:
     def __init__(self, *arguments, process=None):
         self.process = process or self.launch(*arguments)
         started = self.read()
-        self.port, self.token = started["port"], started["token"]
+        self.port, self.token = started["port"], started.get("token")
         self.url = f"http://127.0.0.1:{self.port}/"
 
     def read(self):
