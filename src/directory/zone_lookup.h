@@ -1,10 +1,9 @@
 #pragma once
 
-#include <filesystem>
-#include <memory>
 #include <string>
 
 #include "common/clock.h"
+#include "directory/directory_file.h"
 #include "directory/directory_keeper.h"
 #include "directory/signed_document.h"
 #include "directory/zone_directory.h"
@@ -13,7 +12,7 @@
 namespace livemap::directory {
 
 /// Says in which zone a place lies, by the zone directory that another part of the vehicle keeps in
-/// a file (DirectoryKeeper). The file is read again when it has changed. Not thread-safe.
+/// a file (DirectoryFile). Not thread-safe.
 ///
 /// Typical usage:
 ///
@@ -34,13 +33,8 @@ class ZoneLookup {
   std::string IdAt(const geo::GeoPoint& point);
 
  private:
-  void ReadAgainIfChanged();
-
   const Config config_;
-  const TrustedAuthority authority_;
-  const DirectoryKeeper::Clock now_ns_;
-  std::filesystem::file_time_type read_time_{};  // Of the file that keeper_ has read.
-  std::unique_ptr<DirectoryKeeper> keeper_;
+  DirectoryFile file_;
 };
 
 }  // namespace livemap::directory

@@ -57,6 +57,23 @@ TEST_F(ZoneLookupTest, ReadsTheFileAgainWhenItHasChanged) {
   EXPECT_EQ(zones.IdAt(kOakland), "shadyside") << "which is still in time";
 }
 
+TEST_F(ZoneLookupTest, AHalfWrittenOrOlderFileTakesNothingAway) {
+  Write(authority_.Sign(DirectoryText(2)), 0);
+  ZoneLookup zones = Lookup();
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland");
+  const std::string whole = authority_.Sign(DirectoryText(3));
+  Write(whole.substr(0, whole.size() / 2), 1);
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland") << "half of it";
+  std::string older = DirectoryText(1);
+  older.replace(older.find("oakland"), 7, "shadyside");
+  Write(authority_.Sign(older), 2);
+  EXPECT_EQ(zones.IdAt(kOakland), "oakland") << "an older one";
+  std::string newer = DirectoryText(3);
+  newer.replace(newer.find("oakland"), 7, "shadyside");
+  Write(authority_.Sign(newer), 3);
+  EXPECT_EQ(zones.IdAt(kOakland), "shadyside");
+}
+
 TEST_F(ZoneLookupTest, ADirectoryThatIsForgedOrExpiredCountsForNothing) {
   Write(TestAuthority().Sign(DirectoryText(1)), 0);
   ZoneLookup zones = Lookup();

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,12 +12,11 @@
 #include <random>
 #include <set>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "common/mutex.h"
-#include "directory/directory_keeper.h"
+#include "directory/directory_file.h"
 #include "directory/zone_handover.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/mqtt_bridge/zone_connections.h"
@@ -166,6 +164,8 @@ class MqttBridgePart : public NodeletPart {
 
   /// Starts to choose the zones by the vehicle's position.
   void FollowZones() {
+    directory_file_.emplace(directory::TrustedAuthority::Read(config_.zones.authority),
+                            config_.zones.directory);
     ReadDirectory();
     StayWithConfiguredZone();
     zones_publisher_ = getNodeHandle().advertise<VehicleZones>("zones", 1, /*latch=*/true);
@@ -183,18 +183,8 @@ class MqttBridgePart : public NodeletPart {
 
   /// Again when somebody has put another file in its place.
   void ReadDirectory() {
-    std::error_code missing;
-    const auto time = std::filesystem::last_write_time(config_.zones.directory, missing);
-    if (keeper_ && (missing || time == directory_time_)) return;
-    auto next = std::make_unique<directory::DirectoryKeeper>(
-        directory::TrustedAuthority::Read(config_.zones.authority), config_.zones.directory);
-    directory_time_ = time;
-    if (!next->damage().empty()) NODELET_ERROR("%s", next->damage().c_str());
-    // One that is half written, or older, takes nothing away from the one before.
-    const auto before = keeper_ ? keeper_->directory() : nullptr;
-    const auto after = next->directory();
-    if (before && (!after || after->version() < before->version())) return;
-    keeper_ = std::move(next);
+    if (!directory_file_->ReadIfChanged() || directory_file_->damage().empty()) return;
+    NODELET_ERROR("%s", directory_file_->damage().c_str());
   }
 
   void StayWithConfiguredZone() {
@@ -213,7 +203,7 @@ class MqttBridgePart : public NodeletPart {
 
   void MoveTo(const sensor_msgs::NavSatFix& message) {
     const geo::Fix fix = ros_io::ToFix(message);
-    const auto directory = keeper_->directory();
+    const auto directory = directory_file_->directory();
     if (!fix.has_fix || !geo::IsValid(fix.position) || !directory) return;
     if (handover_->Move(*directory, fix.position)) {
       NODELET_INFO("the present zone is '%s'", handover_->present().c_str());
@@ -222,7 +212,7 @@ class MqttBridgePart : public NodeletPart {
   }
 
   void ConnectToZones() {
-    const auto directory = keeper_->directory();
+    const auto directory = directory_file_->directory();
     // A zone that the directory no longer has may have no broker.
     const bool is_known = directory && (handover_->present() == config_.zone ||
                                         directory->FindId(handover_->present()));
@@ -336,7 +326,7 @@ class MqttBridgePart : public NodeletPart {
   /// The connection to a zone, which may have to be made; null: it is not known where its broker
   /// is, or other zones have the connections.
   transport::MqttClient* ConnectionTo(const std::string& zone) {
-    if (handover_ && FindZone(zone, keeper_->directory().get())) {
+    if (handover_ && FindZone(zone, directory_file_->directory().get())) {
       handover_->NoteMessage(zone, SteadyS());
       if (connections_->Find(zone) == nullptr) ConnectToZones();
     }
@@ -421,7 +411,7 @@ class MqttBridgePart : public NodeletPart {
     }
     if (!handover_) return;
     status.add("present_zone", present);
-    const auto directory = keeper_->directory();
+    const auto directory = directory_file_->directory();
     status.add("zone_directory_version", directory ? directory->version() : 0);
     for (const auto& [zone, connection] : zones) DiagnoseZone(zone, connection, status);
   }
@@ -447,8 +437,7 @@ class MqttBridgePart : public NodeletPart {
   OnceAMinute say_losses_again_ GUARDED_BY(losses_mutex_);
   std::set<std::string> said_losses_ GUARDED_BY(losses_mutex_);  ///< In this minute.
   // Of a vehicle that changes zones; else null.
-  std::unique_ptr<directory::DirectoryKeeper> keeper_;
-  std::filesystem::file_time_type directory_time_{};  ///< Of the file that keeper_ has read.
+  std::optional<directory::DirectoryFile> directory_file_;
   std::unique_ptr<directory::ZoneHandover> handover_;
   std::vector<std::string> told_zones_;
   std::optional<double> fused_s_;  ///< When the last fused fix came.
