@@ -86,12 +86,14 @@ std::string LocalHazardMap::ZoneOf(const std::string& named) const {
 
 void LocalHazardMap::GiveRowsTheirZone() {
   if (config_.zone.empty()) {
-    // There is one zone now, which has all of it or tells what is gone.
+    // There is one zone now, which has all of it or tells what is gone. A report whose zone has no
+    // possible name stays broken, as it was counted.
     database_->Transaction([&] {
       database_->Execute(
-          "UPDATE known SET zone='', sequence=min(sequence,1) WHERE zone<>'';"
-          "UPDATE pending SET zone='' WHERE zone<>'';"
-          "DELETE FROM gone WHERE zone<>''; DELETE FROM zones WHERE zone<>'';");
+          std::string("UPDATE known SET zone='', sequence=min(sequence,1) WHERE zone<>'';"
+                      "DELETE FROM gone WHERE zone<>''; DELETE FROM zones WHERE zone<>'';"
+                      "UPDATE pending SET zone='' WHERE zone<>'' AND ") +
+          kZoneColumnIsValid);
     });
     return;
   }
