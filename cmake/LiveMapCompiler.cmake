@@ -11,7 +11,7 @@ endif()
 # as in Release, with line tables only.
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 
-# A library on the line that a program does not use is not loaded when it starts: libtorch takes half a second.
+# A library on the line that a program does not use is not loaded when it starts.
 add_link_options(-Wl,--as-needed)
 
 # The sources of a target are compiled as a few, since their headers cost more than they do. Names in

@@ -53,6 +53,10 @@ function(livemap_gtest name)
   endif()
   set_target_properties(${name} PROPERTIES LIVEMAP_IS_TEST ON)
   add_dependencies(livemap_gtests ${name})
+  get_property(opened GLOBAL PROPERTY LIVEMAP_OPENED_LIBRARIES)
+  if(opened)
+    add_dependencies(${name} ${opened})
+  endif()
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT 600)
 endfunction()
@@ -80,10 +84,14 @@ endfunction()
 
 # livemap_part(NAME folder ...)
 #
-# The target NAME: all programs and plugin libraries of these folders. ./livemap builds one where the
-# build folder has more than a command runs.
+# The target NAME: all programs and plugin libraries of these folders, and the libraries that they open. ./livemap
+# builds one where the build folder has more than a command runs.
 function(livemap_part name)
   add_custom_target(${name})
+  get_property(opened GLOBAL PROPERTY LIVEMAP_OPENED_LIBRARIES)
+  if(opened)
+    add_dependencies(${name} ${opened})
+  endif()
   foreach(folder IN LISTS ARGN)
     livemap_targets_below(${PROJECT_SOURCE_DIR}/${folder} "(EXECUTABLE|SHARED_LIBRARY)" programs)
     add_dependencies(${name} ${programs})

@@ -1,4 +1,5 @@
-// The one file that sees libtorch's headers: they take as long to compile as a room.
+// The one file that sees libtorch's headers: they take as long to compile as a room. It is a
+// library of its own, which torch_library.cpp opens.
 #include <ATen/Context.h>
 #include <ATen/Parallel.h>
 #include <c10/core/CPUAllocator.h>
@@ -15,6 +16,7 @@
 #include "common/error.h"
 #include "perception/inference/block_cache.h"
 #include "perception/inference/engines.h"
+#include "perception/inference/torch_library.h"
 
 namespace livemap::perception {
 namespace {
@@ -223,14 +225,11 @@ class Int8Engine final : public InferenceEngine {
 
 }  // namespace
 
-bool HasTorchEngine() { return true; }
-
-std::unique_ptr<InferenceEngine> MakeTorchEngine(const ModelManifest& manifest, int threads) {
-  return std::make_unique<TorchEngine>(manifest, threads);
-}
-
-std::unique_ptr<InferenceEngine> MakeInt8Engine(const ModelManifest& manifest, int threads) {
-  return std::make_unique<Int8Engine>(manifest, threads);
-}
-
 }  // namespace livemap::perception
+
+extern "C" livemap::perception::InferenceEngine* LiveMapMakeTorchEngine(
+    const livemap::perception::ModelManifest& manifest, int threads, bool int8) {
+  using namespace livemap::perception;
+  if (int8) return std::make_unique<Int8Engine>(manifest, threads).release();
+  return std::make_unique<TorchEngine>(manifest, threads).release();
+}
