@@ -16,4 +16,10 @@ std::string ZoneLookup::IdAt(const geo::GeoPoint& point) {
   return found ? directory->zones()[found->zone].id : "";
 }
 
+bool ZoneLookup::IsGone(const std::string& id) {
+  file_.ReadIfChanged();
+  const auto directory = file_.directory();
+  return directory && !directory->FindId(id);
+}
+
 }  // namespace livemap::directory

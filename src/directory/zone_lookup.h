@@ -31,6 +31,8 @@ class ZoneLookup {
   /// The id of the zone that serves `point`. Empty where no zone is near, and while there is no
   /// valid directory.
   std::string IdAt(const geo::GeoPoint& point);
+  /// Whether the directory has no zone with this id. False while there is no valid directory.
+  bool IsGone(const std::string& id);
 
  private:
   const Config config_;

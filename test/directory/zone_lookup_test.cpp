@@ -45,6 +45,16 @@ TEST_F(ZoneLookupTest, KnowsNoZoneUntilThereIsADirectory) {
   EXPECT_EQ(zones.IdAt({50, 8}), "") << "far from all zones";
 }
 
+TEST_F(ZoneLookupTest, AZoneIsGoneOnlyByTheWordOfAValidDirectory) {
+  ZoneLookup zones = Lookup();
+  EXPECT_FALSE(zones.IsGone("oakland")) << "there is no directory yet";
+  Write(authority_.Sign(DirectoryText(1)), 0);
+  EXPECT_FALSE(zones.IsGone("oakland"));
+  EXPECT_TRUE(zones.IsGone("atlantis"));
+  now_ns_ += 100'000'000'000'000'000;  // Over three years.
+  EXPECT_FALSE(zones.IsGone("atlantis")) << "it has expired";
+}
+
 TEST_F(ZoneLookupTest, ReadsTheFileAgainWhenItHasChanged) {
   Write(authority_.Sign(DirectoryText(1)), 0);
   ZoneLookup zones = Lookup();

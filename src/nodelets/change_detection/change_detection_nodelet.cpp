@@ -98,7 +98,7 @@ class ChangeDetectionPart : public NodeletPart {
       sender.min_confidence = config_.tell_confidence;
       // Without a directory there is one zone, whatever it is called.
       if (!config_.zones.directory.empty()) sender.outbox.zone = config_.zones.zone;
-      sender.zones = ros_io::MakeZoneLookup(config_.zones);
+      sender.zones = ros_io::MakeZoneFinder(config_.zones);
       sender.outbox.path = config_.watch.memory.directory + "/map_changes.sqlite3";
       sender_ = std::make_unique<MapChangeSender>(sender, getNodeHandle(), now_ns);
     }

@@ -17,6 +17,7 @@ MapChangeSender::MapChangeSender(const Config& config, ros::NodeHandle& node, st
     : config_(config),
       random_(EntropySeededGenerator()),
       outbox_(config.outbox, EntropySeededGenerator(), now_ns, SteadyS()) {
+  outbox_.SetZones(config_.zones);
   if (!outbox_.set_aside().empty()) {
     ROS_ERROR("the store of changes for the zone was corrupt: it is now '%s'",
               outbox_.set_aside().c_str());
@@ -35,7 +36,6 @@ void MapChangeSender::Tell(const std::vector<change::PlacedChange>& passed) {
       ++unsure_;
       continue;
     }
-    if (config_.zones) report->zone = config_.zones->IdAt(report->position);
     try {
       outbox_.Add(*report, SteadyS());
     } catch (const Error& error) {

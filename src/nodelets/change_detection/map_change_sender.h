@@ -3,14 +3,12 @@
 #include <livemap/ReportReceipt.h>
 #include <ros/ros.h>
 
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "change/objects/change_detector.h"
 #include "common/mutex.h"
-#include "directory/zone_lookup.h"
 #include "nodelets/diagnostics.h"
 #include "vehicle/outbox/map_change_outbox.h"
 
@@ -21,8 +19,8 @@ class MapChangeSender {
  public:
   struct Config {
     std::string drive_id;
-    double min_confidence = 0.5;                   ///< Less sure objects are not told.
-    std::shared_ptr<directory::ZoneLookup> zones;  ///< Null: all objects lie in outbox.zone.
+    double min_confidence = 0.5;  ///< Less sure objects are not told.
+    vehicle::ZoneFinder zones;
     vehicle::MapChangeOutbox::Config outbox;
   };
 

@@ -85,10 +85,7 @@ class HazardReportingPart : public NodeletPart {
     MakeDirectoryOf(config_.reporter.map.path);
     reporter_ = std::make_unique<vehicle::HazardReporter>(
         config_.reporter, catalogue_, EntropySeededGenerator(), now_ns, SteadyS());
-    if (auto zones = ros_io::MakeZoneLookup(config_.zones)) {
-      reporter_->SetZoneLookup(
-          [zones](const geo::GeoPoint& position) { return zones->IdAt(position); });
-    }
+    reporter_->SetZones(ros_io::MakeZoneFinder(config_.zones));
     responder_ = std::make_unique<vehicle::PollResponder>(config_.polls, catalogue_);
     maker_ = std::make_unique<PictureMaker>(MakeMaskerConfig(config_.privacy, config_.mask),
                                             getName(), config_.draw_boxes);

@@ -137,6 +137,7 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("notices_missing", reporter.map().has_gap());
   status.add("zones_known", reporter.map().zone_count());
   status.add("forgotten_unannounced", counters.forgotten_unannounced);
+  status.add("redirected", counters.redirected);
   status.add("known", reporter.map().known_count());
   status.add("waiting_frames", reporter.waiting_frames());
   status.add("notices", counters.notices);

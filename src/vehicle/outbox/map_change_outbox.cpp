@@ -122,7 +122,8 @@ void MapChangeOutbox::Add(const protocol::MapChangeReport& report, double steady
                 "' has values that no zone accepts");
   }
   protocol::MapChangeReport stored = report;
-  stored.zone = ZoneOf(report.zone);
+  if (zones_.zone_at) stored.zone = zones_.zone_at(report.position);
+  stored.zone = ZoneOf(stored.zone);
   InsertMapChange(*database_, stored);
   pending_[report.uuid] = std::move(stored);
   schedule_.Add(report.uuid, kChangeUrgency, report.stamp_ns, steady_s);
@@ -136,9 +137,21 @@ std::vector<protocol::MapChangeReport> MapChangeOutbox::TakeDue(double steady_s,
   for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
     ++(schedule_.WasSent(uuid) ? counters_.resends : counters_.sent);
     schedule_.MarkSent(uuid);
-    reports.push_back(pending_.at(uuid));
+    protocol::MapChangeReport& report = pending_.at(uuid);
+    Redirect(report);
+    reports.push_back(report);
   }
   return reports;
+}
+
+void MapChangeOutbox::Redirect(protocol::MapChangeReport& report) {
+  const std::string zone = ZoneOf(zones_.Redirect(report.zone, report.position));
+  if (zone == report.zone) return;
+  database_->Prepare("UPDATE pending SET zone=? WHERE uuid=?")
+      .Bind(1, zone)
+      .BindBlob(2, report.uuid.bytes.data(), report.uuid.bytes.size())
+      .Execute();
+  report.zone = zone;
 }
 
 void MapChangeOutbox::AddReceipt(const protocol::Receipt& receipt) {

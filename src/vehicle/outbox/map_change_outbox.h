@@ -6,12 +6,14 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/sqlite.h"
 #include "protocol/map_change_report.h"
 #include "protocol/report.h"
 #include "vehicle/outbox/resend_schedule.h"
+#include "vehicle/outbox/zone_finder.h"
 
 namespace livemap::vehicle {
 
@@ -45,6 +47,9 @@ class MapChangeOutbox {
   /// The new name of a file that was corrupt, empty when it was not.
   const std::string& set_aside() const { return set_aside_; }
 
+  /// As for HazardReporter.
+  void SetZones(ZoneFinder zones) { zones_ = std::move(zones); }
+
   /// Durable when it returns. Throws StoreError, and Error for a report that no zone would take.
   void Add(const protocol::MapChangeReport& report, double steady_s);
   /// Reports that are to be sent now; steady seconds from any origin. They stay until answered.
@@ -59,10 +64,12 @@ class MapChangeOutbox {
  private:
   std::string ZoneOf(const std::string& named) const;
   void Load(double steady_s);
+  void Redirect(protocol::MapChangeReport& report);
   void Erase(const Uuid& uuid);
   void Displace();
 
   Config config_;
+  ZoneFinder zones_;
   std::unique_ptr<SqliteDatabase> database_;
   std::string set_aside_;
   std::map<Uuid, protocol::MapChangeReport> pending_;

@@ -182,7 +182,7 @@ void HazardReporter::AddDepth(std::int64_t stamp_ns, const placement::DepthImage
 
 void HazardReporter::Process(double now_s, double steady_s) {
   ApplyNotices();
-  ForgetUnannounced(now_s);
+  ForgetWhatNobodyTells(now_s);
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
   for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
@@ -439,13 +439,14 @@ void HazardReporter::ApplyNotices() {
 }
 
 /// Once a minute of the stamps' clock.
-void HazardReporter::ForgetUnannounced(double now_s) {
+void HazardReporter::ForgetWhatNobodyTells(double now_s) {
   constexpr double kPeriodS = 60.0;
   if (forgot_s_ && now_s >= *forgot_s_ && now_s - *forgot_s_ < kPeriodS) return;
   forgot_s_ = now_s;
   try {
     counters_.forgotten_unannounced +=
         map_.ForgetUnannounced(static_cast<std::int64_t>(now_s * 1e9));
+    if (zones_.is_gone) map_.ForgetZones(zones_.is_gone);
   } catch (const StoreError& error) {
     TellStoreError(error);
   }
@@ -482,7 +483,7 @@ protocol::Report HazardReporter::MakeReport(WaitingFrame& waiting, std::size_t i
   report.image_width = waiting.frame.image_width;
   report.image_height = waiting.frame.image_height;
   report.image_frame_id = waiting.frame.frame_id;
-  if (zone_of_) report.zone = zone_of_(report.position);
+  if (zones_.zone_at) report.zone = zones_.zone_at(report.position);
   AttachPicture(waiting, index, report);
   return report;
 }
@@ -574,7 +575,7 @@ std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size
   schedule_.SetCheapLink(IsCheap(steady_s));
   try {
     for (const Uuid& uuid : schedule_.TakeDue(steady_s, limit)) {
-      auto report = map_.LoadPending(uuid);
+      auto report = LoadToSend(uuid);
       if (!report) continue;
       if (schedule_.WasSent(uuid)) {
         ++counters_.resends;
@@ -589,6 +590,18 @@ std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size
     TellStoreError(error);
   }
   return reports;
+}
+
+/// The report, given anew to a zone where its own is gone.
+std::optional<protocol::Report> HazardReporter::LoadToSend(const Uuid& uuid) {
+  auto report = map_.LoadPending(uuid);
+  if (!report) return report;
+  const std::string zone = zones_.Redirect(report->zone, report->position);
+  if (zone == report->zone) return report;
+  const std::string given = map_.GiveZone(uuid, zone);
+  if (given != report->zone) ++counters_.redirected;
+  report->zone = given;
+  return report;
 }
 
 void HazardReporter::TellStoreError(const StoreError& error) {

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <map>
 #include <optional>
 #include <random>
@@ -21,6 +20,7 @@
 #include "protocol/notice.h"
 #include "protocol/report.h"
 #include "vehicle/outbox/resend_schedule.h"
+#include "vehicle/outbox/zone_finder.h"
 #include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 #include "vehicle/reporting/local_hazard_map.h"
@@ -132,8 +132,9 @@ class HazardReporter {
     std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
     std::uint64_t notices = 0;
     std::uint64_t invalid_notices = 0;
-    std::uint64_t forgotten_unannounced =
-        0;  ///< Hazards that the zone took in and never announced.
+    /// Hazards that the zone took in and never announced.
+    std::uint64_t forgotten_unannounced = 0;
+    std::uint64_t redirected = 0;  ///< Reports whose zone is gone, sent to the one of their place.
     std::uint64_t fixes = 0;
     std::uint64_t invalid_fixes = 0;    ///< NaN, out of range, out of order.
     std::uint64_t no_fixes = 0;         ///< The receiver said that it had none.
@@ -180,11 +181,9 @@ class HazardReporter {
   std::vector<PictureOrder> TakePictureOrders();
   /// The answer to an order: one picture for each cut, or nothing where none may leave the vehicle.
   void AddPictures(std::uint64_t order, std::vector<imaging::CroppedPicture> pictures);
-  /// How to find the id of the zone in which a hazard lies, for its report; an empty id stands for
-  /// the configured zone, as it does for all hazards while nothing is set.
-  void SetZoneLookup(std::function<std::string(const geo::GeoPoint&)> zone_of) {
-    zone_of_ = std::move(zone_of);
-  }
+  /// Reports go to the zone in which their hazard lies; those that wait for a zone that exists no
+  /// longer, to the one that has their place now. Hazards of such a zone are forgotten.
+  void SetZones(ZoneFinder zones) { zones_ = std::move(zones); }
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const protocol::Notice& notice);
   void AddReceipt(const protocol::Receipt& receipt);
@@ -246,14 +245,15 @@ class HazardReporter {
   bool IsCheap(double steady_s) const;
   std::int64_t UtcNs(double steady_s) const;
   void ApplyNotices();
-  void ForgetUnannounced(double now_s);
+  void ForgetWhatNobodyTells(double now_s);
+  std::optional<protocol::Report> LoadToSend(const Uuid& uuid);
   void TellStoreError(const StoreError& error);
 
   Config config_;
   protocol::HazardCatalogue catalogue_;
   std::mt19937_64 random_;
   LocalHazardMap map_;
-  std::function<std::string(const geo::GeoPoint&)> zone_of_;
+  ZoneFinder zones_;
   VehiclePoseLookup vehicle_poses_;
   ResendSchedule schedule_;
   std::optional<geo::CameraIntrinsics> intrinsics_;

@@ -272,6 +272,47 @@ bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   return true;
 }
 
+std::string LocalHazardMap::GiveZone(const Uuid& report, const std::string& zone) {
+  std::string given = ZoneOf(zone);
+  database_->Transaction([&] {
+    for (const char* row : {"pending SET zone=? WHERE uuid=?", "known SET zone=? WHERE id=?"}) {
+      database_->Prepare(std::string("UPDATE ") + row)
+          .Bind(1, given)
+          .BindBlob(2, report.bytes.data(), report.bytes.size())
+          .Execute();
+    }
+  });
+  return given;
+}
+
+void LocalHazardMap::ForgetZones(const std::function<bool(const std::string&)>& is_gone) {
+  std::vector<std::string> gone;
+  SqliteStatement zones =
+      database_->Prepare("SELECT zone FROM known WHERE of_zone=1 UNION SELECT zone FROM zones");
+  while (zones.Step()) {
+    const std::string zone = zones.Text(0);
+    if (zone != config_.zone && is_gone(zone)) gone.push_back(zone);
+  }
+  if (gone.empty()) return;
+  std::vector<Change> changes;
+  database_->Transaction([&] {
+    for (const std::string& zone : gone) {
+      SqliteStatement rows = database_->Prepare("SELECT id FROM known WHERE zone=? AND of_zone=1");
+      rows.Bind(1, zone);
+      std::vector<Uuid> told;
+      while (rows.Step()) told.push_back(UuidFromBlob(rows.Blob(0)));
+      for (const Uuid& id : told) Forget(id, changes);
+      for (const char* table : {"gone", "zones"}) {
+        database_->Prepare(std::string("DELETE FROM ") + table + " WHERE zone=?")
+            .Bind(1, zone)
+            .Execute();
+      }
+    }
+  });
+  Show(changes);
+  for (const std::string& zone : gone) zones_.erase(zone);
+}
+
 std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
   SqliteStatement rows = database_->Prepare(
       std::string("SELECT uuid,class_name,stamp_ns,sent,hold_until_ns FROM pending WHERE ") +

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -111,6 +112,13 @@ class LocalHazardMap {
   /// hazard goes on under the zone's id. A refused one stays known, or it would be reported anew
   /// at the next sight.
   bool Apply(const protocol::Receipt& receipt);
+
+  /// Gives an unfinished report, with what is known of its hazard, to another zone; an empty id is
+  /// the configured one's. Returns the id.
+  std::string GiveZone(const Uuid& report, const std::string& zone);
+  /// Forgets what the zones told of which `is_gone` says so, the configured one excepted: nobody
+  /// takes their hazards back any more. The vehicle's own unfinished reports stay.
+  void ForgetZones(const std::function<bool(const std::string&)>& is_gone);
 
   std::vector<PendingReport> Pending() const;
   /// Forgets hazards that the zone took in but never announced, whose class's expected life has

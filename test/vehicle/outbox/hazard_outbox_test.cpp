@@ -194,5 +194,32 @@ TEST_F(HazardReporterTest, AHazardThatTheZoneNeverAnnouncedIsReportedAnewAfterIt
   EXPECT_EQ(counters().forgotten_unannounced, 1u);
 }
 
+TEST_F(HazardReporterTest, AReportForAZoneThatHasLeftTheDirectoryGoesToTheOneOfItsPlace) {
+  config_.map.zone = "west";
+  Restart();
+  std::string of_place = "east";
+  reporter_->SetZones(
+      {[&](const geo::GeoPoint&) { return of_place; },
+       [&](const std::string& zone) { return zone == "east" && of_place != zone; }});
+  DriveFixes(0, 4);
+  See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
+  EXPECT_EQ(TakeDue().at(0).zone, "east");
+  of_place = "north";
+  steady_s_ += 3600;
+  const auto again = TakeDue();
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again[0].zone, "north");
+  EXPECT_EQ(counters().redirected, 1U);
+  protocol::Receipt receipt;
+  receipt.report_uuid = again[0].uuid;
+  receipt.hazard_uuid.bytes[0] = 9;
+  receipt.zone = "east";
+  reporter_->AddReceipt(receipt);
+  EXPECT_EQ(reporter_->map().pending_count(), 1U) << "it is no longer for east to answer";
+  receipt.zone = "north";
+  reporter_->AddReceipt(receipt);
+  EXPECT_EQ(reporter_->map().pending_count(), 0U);
+}
+
 }  // namespace
 }  // namespace livemap::vehicle

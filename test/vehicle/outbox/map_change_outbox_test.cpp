@@ -123,6 +123,23 @@ TEST_F(MapChangeOutboxTest, OnlyTheZoneInWhichTheObjectLiesEndsItsReport) {
   EXPECT_EQ(outbox_->pending(), 0U);
 }
 
+TEST_F(MapChangeOutboxTest, AReportForAZoneThatIsGoneGoesToTheOneOfItsPlace) {
+  config_.zone = "west";
+  Restart();
+  std::string of_place = "east";
+  const ZoneFinder zones = {[&](const geo::GeoPoint&) { return of_place; },
+                            [&](const std::string& zone) { return zone != of_place; }};
+  outbox_->SetZones(zones);
+  outbox_->Add(SignGone(1), 0);
+  of_place = "north";
+  EXPECT_EQ(outbox_->TakeDue(0, 10).at(0).zone, "north");
+  Restart();
+  EXPECT_EQ(outbox_->TakeDue(0, 10).at(0).zone, "north") << "that is on disk";
+  of_place = "";
+  outbox_->SetZones(zones);
+  EXPECT_EQ(outbox_->TakeDue(3600, 10).at(0).zone, "west") << "no zone has the place";
+}
+
 TEST_F(MapChangeOutboxTest, RowsOfAnOlderProgramBelongToTheConfiguredZone) {
   outbox_->Add(SignGone(1), 0);
   outbox_.reset();

@@ -162,6 +162,34 @@ TEST_F(LocalHazardZones, WithoutADirectoryAnyMoreTheOneZoneTakesWhatWaitsAndTell
   EXPECT_EQ(map_->pending_count(), 0U);
 }
 
+TEST_F(LocalHazardZones, AReportIsGivenToAnotherZoneWithWhatIsKnownOfItsHazard) {
+  protocol::Report report = MakeReport(1, kStreet);
+  report.zone = "east";
+  map_->Add(report);
+  EXPECT_EQ(map_->GiveZone(Id(1), "north"), "north");
+  Restart();
+  EXPECT_EQ(map_->LoadPending(Id(1))->zone, "north");
+  EXPECT_EQ(ZonesOfKnown(), (std::map<Uuid, std::string>{{Id(1), "north"}}));
+  EXPECT_FALSE(map_->Apply(CommittedBy("east", 1, 9)));
+  EXPECT_EQ(map_->GiveZone(Id(1), ""), "west") << "which is configured";
+}
+
+TEST_F(LocalHazardZones, HazardsOfAZoneThatIsGoneAreForgottenAndOwnReportsStay) {
+  protocol::Report report = MakeReport(1, kStreet);
+  report.zone = "east";
+  map_->Add(report);
+  map_->Apply({OfZone("west", Action::kAdded, 2, 100, 0, 1),
+               OfZone("east", Action::kAdded, 3, 200, 0, 4),
+               OfZone("north", Action::kAdded, 4, 300, 0, 8)});
+  map_->ForgetZones([](const std::string& zone) { return zone != "north"; });
+  EXPECT_EQ(ZonesOfKnown(),
+            (std::map<Uuid, std::string>{{Id(1), "east"}, {Id(2), "west"}, {Id(4), "north"}}))
+      << "west is configured";
+  EXPECT_FALSE(map_->Find("pothole", East(200)));
+  EXPECT_EQ(map_->map_sequence("east"), 0U) << "if it comes back, it tells all";
+  EXPECT_EQ(map_->pending_count(), 1U);
+}
+
 TEST_F(LocalHazardZones, WithoutAConfiguredZoneThereIsOneWhateverItsId) {
   config_.path += "-one";
   config_.zone.clear();

@@ -1,7 +1,9 @@
 #include "ros/parameters/shared/shared_parameters.h"
 
 #include <ctime>
+#include <memory>
 
+#include "directory/zone_lookup.h"
 #include "transport/topic_template.h"
 
 namespace livemap::ros_io {
@@ -66,12 +68,14 @@ void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones) {
   ReadZoneDirectory(parameters, zones);
 }
 
-std::shared_ptr<directory::ZoneLookup> MakeZoneLookup(const ZoneParameters& zones) {
-  if (zones.directory.empty()) return nullptr;
+vehicle::ZoneFinder MakeZoneFinder(const ZoneParameters& zones) {
+  if (zones.directory.empty()) return {};
   directory::ZoneLookup::Config config;
   config.file = zones.directory;
-  return std::make_shared<directory::ZoneLookup>(
+  const auto lookup = std::make_shared<directory::ZoneLookup>(
       config, directory::TrustedAuthority::Read(zones.authority));
+  return {[lookup](const geo::GeoPoint& place) { return lookup->IdAt(place); },
+          [lookup](const std::string& zone) { return lookup->IsGone(zone); }};
 }
 
 void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track) {

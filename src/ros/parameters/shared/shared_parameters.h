@@ -1,13 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 
-#include "directory/zone_lookup.h"
 #include "geo/ground_projection.h"
 #include "perception/privacy/privacy_mask.h"
 #include "ros/parameters/shared/parameter_reader.h"
+#include "vehicle/outbox/zone_finder.h"
 #include "vehicle/positioning/fix_track.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
 
@@ -31,9 +30,9 @@ void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones);
 /// The same with `zone`.
 void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones);
 
-/// Finds the zone of a place by the zone directory; null where none is used. Throws Error when the
-/// authority's certificate cannot be read.
-std::shared_ptr<directory::ZoneLookup> MakeZoneLookup(const ZoneParameters& zones);
+/// Asks the zone directory; empty where none is used. Throws Error when the authority's certificate
+/// cannot be read.
+vehicle::ZoneFinder MakeZoneFinder(const ZoneParameters& zones);
 
 /// How position and course are made of the fixes.
 void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track);
