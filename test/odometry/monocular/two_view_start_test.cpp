@@ -47,10 +47,11 @@ const std::vector<cv::Mat>& StartPictures() {
 
 /// A start by the walk's first frames, and which one is its second.
 struct Started {
-  TwoViewStart start{TwoViewStart::Config(), StartTestCamera().intrinsics};
+  TwoViewStart start;
   int second = 0;
 
-  Started() {
+  explicit Started(const TwoViewStart::Config& config = TwoViewStart::Config())
+      : start(config, StartTestCamera().intrinsics) {
     start.Begin(StartPictures()[0]);
     do {
       ++second;
@@ -94,7 +95,9 @@ TEST(TwoViewStart, ALongerBaselineTakesTheShortOnesPlaceUntilDepthsAreCertain) {
 }
 
 TEST(TwoViewStart, TwoPosesThatTheCornersContradictRefuteIt) {
-  Started started;
+  TwoViewStart::Config config;
+  config.enough_depth_sigma = 1e9;  // A longer baseline is no reason by itself.
+  Started started(config);
   constexpr double kWrongTurnRad = 0.03;
   EXPECT_EQ(started.Check(started.second + 1, kWrongTurnRad), Verdict::kOpen);
   EXPECT_EQ(started.Check(started.second + 2, kWrongTurnRad), Verdict::kRemake);
