@@ -10,7 +10,6 @@ import json
 import logging
 import pathlib
 import signal
-import socket
 import ssl
 import subprocess
 import sys
@@ -23,16 +22,13 @@ import warnings
 from aiosmtpd.controller import Controller
 from aiosmtpd.smtp import AuthResult
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts" / "lib"))
+from listening_port import free_port  # noqa: E402
+
 SERVER = sys.argv.pop(1)
 RECIPIENTS = pathlib.Path(__file__).with_name("order_recipients.py")
 PATIENCE_S = 60
 COMMON = "retry_s: 0.1\nlongest_retry_s: 0.2\n"
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Process:

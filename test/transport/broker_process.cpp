@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <sys/file.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -13,6 +14,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <thread>
 
 #include "common/error.h"
@@ -21,18 +23,42 @@
 
 namespace livemap::transport {
 
-int FreePort() {
+namespace {
+
+bool CanListenOn(int port) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  const int yes = 1;
+  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   sockaddr_in address{};
   address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof(address);
-  if (bind(fd, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
-      getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    throw Error("no free TCP port");
-  }
+  const bool can =
+      bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0 && listen(fd, 1) == 0;
   close(fd);
-  return ntohs(address.sin_port);
+  return can;
+}
+
+}  // namespace
+
+int FreePort() {
+  // As free_port of scripts/lib/listening_port.py, whose files these are.
+  constexpr int kFirst = 20000;
+  constexpr int kCount = 12000;
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("livemap_ports_" + std::to_string(getuid()));
+  std::filesystem::create_directory(folder);
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
+  std::random_device random;
+  for (int tries = 0; tries < 1000; ++tries) {
+    const int port = kFirst + static_cast<int>(random() % kCount);
+    const int lock = open((folder / std::to_string(port)).c_str(),
+                          O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    // The lock ends with this process.
+    if (lock >= 0 && flock(lock, LOCK_EX | LOCK_NB) == 0 && CanListenOn(port)) return port;
+    if (lock >= 0) close(lock);
+  }
+  throw Error("no free TCP port");
 }
 
 bool IsRoot() { return geteuid() == 0; }

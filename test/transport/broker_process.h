@@ -7,7 +7,8 @@
 
 namespace livemap::transport {
 
-/// A TCP port that was free a moment ago.
+/// A TCP port on which nobody listens. Until this process ends no other test is given it, and the
+/// system draws it for no connection.
 int FreePort();
 
 bool IsRoot();

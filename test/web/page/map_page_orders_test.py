@@ -8,13 +8,15 @@ Skips as map_page_test.py does.
 
 import json
 import pathlib
-import socket
 import subprocess
 import sys
 import tempfile
 
 from map_page_console_test import ConsolePage
 from map_page_fixture import HANG_S, HOSTILE, LAT, LON, Keys, run_tests, start_browser, stop_browser
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "scripts" / "lib"))
+from listening_port import free_port  # noqa: E402
 
 RECIPIENTS = pathlib.Path(__file__).resolve().parents[2] / "orders" / "order_recipients.py"
 
@@ -23,9 +25,7 @@ class RecipientProcess:
     """A recipient of the tests of orders."""
 
     def __init__(self, kind, folder):
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.process = subprocess.Popen(
             [sys.executable, RECIPIENTS, kind, str(self.port), pathlib.Path(folder) / kind],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
