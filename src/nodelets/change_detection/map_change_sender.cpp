@@ -62,8 +62,12 @@ void MapChangeSender::OnReceipt(const ReportReceipt& message) {
 void MapChangeSender::OnTick(const ros::SteadyTimerEvent&) {
   if (publisher_.getNumSubscribers() == 0) return;
   const MutexLock lock(mutex_);
-  for (const protocol::MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
-    publisher_.publish(ros_io::ToMessage(report));
+  try {
+    for (const protocol::MapChangeReport& report : outbox_.TakeDue(SteadyS(), kMaxChangesPerTick)) {
+      publisher_.publish(ros_io::ToMessage(report));
+    }
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // What was due is due again after its pause.
   }
 }
 

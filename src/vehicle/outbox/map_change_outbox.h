@@ -53,6 +53,7 @@ class MapChangeOutbox {
   /// Durable when it returns. Throws StoreError, and Error for a report that no zone would take.
   void Add(const protocol::MapChangeReport& report, double steady_s);
   /// Reports that are to be sent now; steady seconds from any origin. They stay until answered.
+  /// Throws StoreError when one whose zone is gone cannot be given to another zone.
   std::vector<protocol::MapChangeReport> TakeDue(double steady_s, std::size_t limit);
   /// The zone's answer ends its report; one of another report, or of another zone than the
   /// report's, is ignored. Throws StoreError.
