@@ -16,6 +16,7 @@
 #include <fstream>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "common/error.h"
 #include "transport/event_fd.h"
@@ -113,10 +114,18 @@ void ChildProcess::Kill() {
   pid_ = -1;
 }
 
+BrokerProcess::BrokerProcess(std::string zone) : zone_(std::move(zone)) {}
+
+void BrokerProcess::SetPassword(const std::string& user, const std::string& password) {
+  const std::string folder = directory_.path() + "/credentials";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder + "/" + user) << password << "\n";
+}
+
 void BrokerProcess::Start() {
   process_.Start({std::string(LIVEMAP_SOURCE_DIR) + "/scripts/livemap_broker", "--directory",
-                  directory_.path(), "--port", std::to_string(port_), "--zone", "test",
-                  "--vehicles", "car-1,car-2"},
+                  directory_.path(), "--port", std::to_string(port_), "--zone", zone_, "--vehicles",
+                  "car-1,car-2"},
                  port_, directory_.path() + "/broker.log");
 }
 

@@ -45,10 +45,13 @@ class ChildProcess {
 };
 
 /// A real mosquitto on a free port of this machine, configured and started by
-/// scripts/livemap_broker for zone "test" with the vehicles "car-1" and "car-2".
+/// scripts/livemap_broker for one zone with the vehicles "car-1" and "car-2".
 class BrokerProcess {
  public:
+  explicit BrokerProcess(std::string zone = "test");
   void Start();
+  /// Before the start: `user` has this password, as at all brokers of an authority.
+  void SetPassword(const std::string& user, const std::string& password);
   void Kill() { process_.Kill(); }
   /// Forgets sessions and queued messages, as after a lost disk.
   void LoseState();
@@ -58,6 +61,7 @@ class BrokerProcess {
   std::string Password(const std::string& user) const;
 
  private:
+  const std::string zone_;
   const TemporaryDirectory directory_;
   const int port_ = FreePort();
   ChildProcess process_;
