@@ -54,23 +54,27 @@ bool IsTornPem(const std::string& path) {
   return begin == std::string::npos || content.find("-----END ", begin) == std::string::npos;
 }
 
-void SetMosquittoTls(mosquitto* handle, const MqttTlsConfig& tls) {
-  RequireMosquittoSuccess(
-      mosquitto_tls_set(handle, tls.ca_file.c_str(), nullptr, tls.certificate_file.c_str(),
-                        tls.key_file.c_str(), nullptr),
-      "cannot use the TLS files '" + tls.ca_file + "', '" + tls.certificate_file + "', '" +
-          tls.key_file + "'");
-  constexpr int kVerifyPeer = 1;
-  RequireMosquittoSuccess(mosquitto_tls_opts_set(handle, kVerifyPeer, "tlsv1.3", nullptr),
-                          "cannot set TLS 1.3");
+void CheckMosquittoAddress(const MqttAddress& address, bool has_tls) {
+  RequireMqttOption(!address.host.empty(), "host", address.host, "a host name or an address");
+  RequireMqttOption(address.port > 0 && address.port <= 65535, "port", std::to_string(address.port),
+                    "1 to 65535");
+  if (address.fingerprint.empty()) return;
+  const std::string name =
+      "fingerprint of the broker " + address.host + ":" + std::to_string(address.port);
+  // Without TLS no certificate is shown that it could be compared with.
+  RequireMqttOption(has_tls, name, address.fingerprint,
+                    "none where ca_file, certificate_file and key_file are not set");
+  constexpr std::size_t kHexDigits = 64;
+  RequireMqttOption(
+      address.fingerprint.size() == kHexDigits &&
+          address.fingerprint.find_first_not_of("0123456789abcdef") == std::string::npos,
+      name, address.fingerprint, "64 hex digits in lower case (SHA-256)");
 }
 
 }  // namespace
 
 void CheckMqttOptions(const MqttConfig& options) {
-  RequireMqttOption(!options.host.empty(), "host", options.host, "a host name or an address");
-  RequireMqttOption(options.port > 0 && options.port <= 65535, "port", std::to_string(options.port),
-                    "1 to 65535");
+  CheckMosquittoAddress({options.host, options.port, options.fingerprint}, options.tls.has_value());
   RequireMqttOption(!options.client_id.empty(), "client id", options.client_id, "a text");
   RequireMqttOption(options.keepalive_s >= kMinKeepaliveS && options.keepalive_s <= kMaxKeepaliveS,
                     "keepalive_s", std::to_string(options.keepalive_s), "5 to 65535");
@@ -82,14 +86,13 @@ void CheckMqttOptions(const MqttConfig& options) {
   RequireMqttOption(options.max_packet_bytes > 0, "max_packet_bytes",
                     std::to_string(options.max_packet_bytes), "above 0");
   for (const MqttAddress& fallback : options.fallbacks) {
-    RequireMqttOption(!fallback.host.empty(), "host", fallback.host, "a host name or an address");
-    RequireMqttOption(fallback.port > 0 && fallback.port <= 65535, "port",
-                      std::to_string(fallback.port), "1 to 65535");
+    CheckMosquittoAddress(fallback, options.tls.has_value());
   }
   if (options.tls) CheckMosquittoTlsOptions(*options.tls);
 }
 
-MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data) {
+MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, SSL_CTX* tls_context,
+                                    void* user_data) {
   InitializeMosquittoOnce();
   MosquittoHandle handle(mosquitto_new(options.client_id.c_str(), options.clean_start, user_data));
   if (!handle) throw Error("cannot create an MQTT client with id '" + options.client_id + "'");
@@ -106,7 +109,13 @@ MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data) 
         mosquitto_username_pw_set(handle.get(), options.user.c_str(), options.password.c_str()),
         "cannot set MQTT user '" + options.user + "'");
   }
-  if (options.tls) SetMosquittoTls(handle.get(), *options.tls);
+  if (options.tls) {
+    RequireMosquittoSuccess(mosquitto_void_option(handle.get(), MOSQ_OPT_SSL_CTX, tls_context),
+                            "cannot set the context of TLS");
+    // Else the library would put its own check of the certificate into the context.
+    RequireMosquittoSuccess(mosquitto_int_option(handle.get(), MOSQ_OPT_SSL_CTX_WITH_DEFAULTS, 0),
+                            "cannot keep the context of TLS as it is");
+  }
   return handle;
 }
 

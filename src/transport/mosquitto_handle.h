@@ -1,6 +1,7 @@
 #pragma once
 
 #include <mosquitto.h>
+#include <openssl/ssl.h>
 
 #include <memory>
 #include <string>
@@ -22,9 +23,11 @@ void CheckMqttOptions(const MqttConfig& options);
 /// The library's own words do not name the file.
 std::string UnreadableTlsFile(const MqttTlsConfig& tls);
 
-/// A library handle that speaks MQTT v5 with the login and TLS of `options` and hands `user_data`
-/// to its callbacks. Throws Error when the library refuses an option or a TLS file.
-MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, void* user_data);
+/// A library handle that speaks MQTT v5 with the login of `options` and hands `user_data` to its
+/// callbacks. With TLS its connections are made from `tls_context`. Throws Error when the library
+/// refuses an option.
+MosquittoHandle MakeMosquittoHandle(const MqttConfig& options, SSL_CTX* tls_context,
+                                    void* user_data);
 
 /// One blocking connection attempt to the broker, at an address that was just seen to answer; 0 or
 /// a library code.

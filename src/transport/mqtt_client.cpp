@@ -14,6 +14,7 @@
 #include "common/error.h"
 #include "common/mutex.h"
 #include "transport/backoff.h"
+#include "transport/broker_certificate.h"
 #include "transport/event_fd.h"
 #include "transport/mosquitto_handle.h"
 #include "transport/outgoing_queue.h"
@@ -61,8 +62,10 @@ class MqttClient::Connection {
         queue_(options.queue_messages, options.queue_bytes),
         backoff_(options.reconnect_min_s, options.reconnect_max_s, options.reconnect_jitter_seed) {
     CheckMqttOptions(options_);
-    statistics_.broker = {options_.host, options_.port};
-    handle_ = MakeMosquittoHandle(options_, this);
+    brokers_ = {{options_.host, options_.port, options_.fingerprint}};
+    brokers_.insert(brokers_.end(), options_.fallbacks.begin(), options_.fallbacks.end());
+    statistics_.broker = brokers_.front();
+    handle_ = MakeMosquittoHandle(options_, certificate_.context(), this);
     mosquitto_connect_v5_callback_set(handle_.get(), &OnConnect);
     mosquitto_disconnect_v5_callback_set(handle_.get(), &OnDisconnect);
     mosquitto_publish_v5_callback_set(handle_.get(), &OnPublish);
@@ -123,36 +126,51 @@ class MqttClient::Connection {
   /// One connection from the probe to its loss; leaves the cause in loss_reason_.
   void Attempt() {
     loss_reason_.clear();
-    tls_error_.clear();
     // They may have gone since the start, as a revoked vehicle's do on the zone's own machine.
     if (options_.tls) loss_reason_ = UnreadableTlsFile(*options_.tls);
     if (!loss_reason_.empty()) return;
+    std::string reasons;
+    for (std::size_t i = 0; i < brokers_.size() && !stopping_; ++i) {
+      loss_reason_.clear();
+      if (AttemptAt(brokers_[i])) return;
+      // Said now: if another address stands in for this one, nothing else tells of it.
+      if (certificate_.is_refused() && i + 1 < brokers_.size()) EndConnection();
+      reasons += (reasons.empty() ? "" : "; ") + loss_reason_;
+    }
+    loss_reason_ = reasons;
+  }
+
+  /// Whether the broker is at this address: it answers, and shows a certificate that is accepted.
+  bool AttemptAt(const MqttAddress& broker) {
+    tls_error_.clear();
+    if (options_.tls) {
+      tls_error_ = certificate_.Expect(broker, *options_.tls);
+      if (!tls_error_.empty()) {
+        Explain("cannot connect to the broker: TLS: " + tls_error_);
+        return false;
+      }
+    }
     // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
     // let it try only what has just answered.
-    MqttAddress broker{options_.host, options_.port};
-    TcpProbeResult probe =
+    const TcpProbeResult probe =
         ProbeTcp(broker.host, broker.port, options_.connect_timeout_s, stop_.fd());
-    std::string errors = probe.error;
-    for (const MqttAddress& fallback : options_.fallbacks) {
-      if (probe.error.empty() || stopping_) break;
-      broker = fallback;
-      probe = ProbeTcp(broker.host, broker.port, options_.connect_timeout_s, stop_.fd());
-      errors += "; " + probe.error;
-    }
     if (!probe.error.empty()) {
-      loss_reason_ = errors;
-      return;
+      Explain(probe.error);
+      return false;
     }
     {
       const MutexLock lock(mutex_);
       statistics_.broker = broker;
     }
     const int code = ConnectMosquitto(handle_.get(), options_, broker, probe.numeric_address);
-    if (code != MOSQ_ERR_SUCCESS) {
-      loss_reason_ = "cannot connect to the broker: " + DescribeLoss(code);
-      return;
+    if (code == MOSQ_ERR_SUCCESS) {
+      Serve();
+    } else {
+      Explain("cannot connect to the broker: " + DescribeLoss(code));
     }
-    Serve();
+    // OpenSSL's words for it are those for every certificate.
+    if (!certificate_.refusal().empty()) loss_reason_ = certificate_.refusal();
+    return !certificate_.is_refused();
   }
 
   void Serve() {
@@ -365,6 +383,8 @@ class MqttClient::Connection {
   MqttStatistics statistics_ GUARDED_BY(mutex_);
 
   // Thread side.
+  std::vector<MqttAddress> brokers_;
+  BrokerCertificate certificate_;
   MosquittoHandle handle_;
   Backoff backoff_;
   std::map<int, MqttPublishOutcome> inflight_;  ///< By packet id.

@@ -25,8 +25,11 @@ struct MqttTlsConfig {
 struct MqttAddress {
   std::string host;
   int port = 1883;
+  /// SHA-256 of the broker's certificate in DER, 64 lower-case hex digits; empty: any certificate
+  /// that MqttTlsConfig accepts for this host. Needs TLS.
+  std::string fingerprint = {};
   bool operator==(const MqttAddress& other) const {
-    return host == other.host && port == other.port;
+    return host == other.host && port == other.port && fingerprint == other.fingerprint;
   }
 };
 
@@ -34,8 +37,10 @@ struct MqttAddress {
 struct MqttConfig {
   std::string host = "127.0.0.1";
   int port = 1883;
-  /// Other addresses of the broker: each attempt takes the first that answers, in this order after
-  /// host and port. They are checked as those are.
+  std::string fingerprint;  ///< Of the broker at host and port, as MqttAddress::fingerprint.
+  /// Other addresses of the broker: each attempt takes the first that answers, and shows a
+  /// certificate that is accepted, in this order after host and port. They are checked as those
+  /// are.
   std::vector<MqttAddress> fallbacks;
   std::string client_id;  ///< Required. The broker may replace it by the user name.
   std::string user;       ///< Empty: no login.

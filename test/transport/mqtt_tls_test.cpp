@@ -11,6 +11,7 @@
 
 #include "common/error.h"
 #include "test/transport/broker_process.h"
+#include "test/transport/tls_broker.h"
 #include "test/transport/waiting.h"
 #include "transport/mqtt_client.h"
 
@@ -19,60 +20,24 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr char kMakeCertificates[] = R"(
-set -e
-cd "$1"
-for ca in ca other_ca; do
-  openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 \
-    -subj "/CN=$ca" -keyout $ca.key -out $ca.pem
-done
-issue() {  # name, authority, subject alternative name
-  openssl req -new -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -subj "/CN=$1" \
-    -keyout $1.key -out $1.csr
-  echo "subjectAltName=$3" > $1.ext
-  openssl x509 -req -in $1.csr -CA $2.pem -CAkey $2.key -CAcreateserial -days 2 \
-    -extfile $1.ext -out $1.pem
-}
-issue broker ca IP:127.0.0.1
-issue car-1 ca DNS:car-1
-issue stranger other_ca DNS:car-1
-)";
-
 class MqttTlsTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const std::string script = directory_.path() + "/make_certificates";
-    std::ofstream(script) << kMakeCertificates;
-    const std::string command = "bash " + script + " " + directory_.path() + " > " +
-                                directory_.path() + "/openssl.log 2>&1";
-    ASSERT_EQ(std::system(command.c_str()), 0)
-        << ReadFile(directory_.path() + "/openssl.log", 1 << 20);
-    std::ofstream(directory_.path() + "/mosquitto.conf")
-        << "listener " << port_ << " 127.0.0.1\nallow_anonymous true\nrequire_certificate true\n"
-        << "use_identity_as_username true\ntls_version tlsv1.3\ncafile " << File("ca.pem")
-        << "\ncertfile " << File("broker.pem") << "\nkeyfile " << File("broker.key")
-        << (IsRoot() ? "\nuser root\n" : "\n");
-    StartBroker();
-  }
-  void StartBroker() {
-    broker_.Start({"mosquitto", "-c", File("mosquitto.conf")}, port_, File("broker.log"));
-  }
+  MqttTlsTest() { broker_.Start(); }
 
-  std::string File(const std::string& name) const { return directory_.path() + "/" + name; }
+  std::string File(const std::string& name) const { return certificates_.File(name); }
 
   MqttConfig Options(const std::string& name, const std::string& authority) const {
     MqttConfig options;
-    options.port = port_;
+    options.port = broker_.port();
     options.client_id = name;
     options.reconnect_min_s = 0.05;
     options.reconnect_max_s = 0.5;
-    options.tls = MqttTlsConfig{File(authority), File(name + ".pem"), File(name + ".key")};
+    options.tls = certificates_.Tls(name, authority);
     return options;
   }
 
-  const TemporaryDirectory directory_;
-  const int port_ = FreePort();
-  ChildProcess broker_;
+  const TestCertificates certificates_;
+  TlsBroker broker_{certificates_};
 };
 
 /// One attempt may end by a reset before the broker's alert is read; the client tries again.
@@ -81,26 +46,26 @@ bool Says(const MqttClient& client, const std::string& words) {
 }
 
 TEST_F(MqttTlsTest, ConnectsWithACertificateThatTheBrokersAuthoritySigned) {
-  MqttClient car(Options("car-1", "ca.pem"), {}, {});
+  MqttClient car(Options("car-1", "ca"), {}, {});
   EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
   car.Publish("livemap/v1/test/notice", {1, 2, 3}, 1, 0);
   EXPECT_TRUE(Eventually([&] { return car.statistics().published == 1; }));
 }
 
 TEST_F(MqttTlsTest, IsNotLetInWithAnotherAuthoritysCertificate) {
-  const MqttClient stranger(Options("stranger", "ca.pem"), {}, {});
+  const MqttClient stranger(Options("stranger", "ca"), {}, {});
   EXPECT_TRUE(Eventually([&] { return Says(stranger, "TLS: tlsv1 alert unknown ca"); }));
   EXPECT_EQ(stranger.statistics().connections, 0U);
 }
 
 TEST_F(MqttTlsTest, DoesNotTrustABrokerOfAnotherAuthority) {
-  const MqttClient car(Options("car-1", "other_ca.pem"), {}, {});
+  const MqttClient car(Options("car-1", "other_ca"), {}, {});
   EXPECT_TRUE(Eventually([&] { return Says(car, "TLS: certificate verify failed"); }));
   EXPECT_EQ(car.statistics().connections, 0U);
 }
 
 TEST_F(MqttTlsTest, DoesNotTrustABrokerUnderAnotherName) {
-  MqttConfig options = Options("car-1", "ca.pem");
+  MqttConfig options = Options("car-1", "ca");
   options.host = "localhost";  // The certificate is for 127.0.0.1.
   const MqttClient car(options, {}, {});
   EXPECT_TRUE(Eventually([&] { return car.statistics().connection_failures >= 2; }));
@@ -112,8 +77,8 @@ TEST_F(MqttTlsTest, NamesTheFileThatCannotBeRead) {
                               {"certificate_file", &MqttTlsConfig::certificate_file},
                               {"key_file", &MqttTlsConfig::key_file}}) {
     for (const std::string& path :
-         {std::string("/nowhere.pem"), directory_.path(), std::string()}) {
-      MqttConfig options = Options("car-1", "ca.pem");
+         {std::string("/nowhere.pem"), std::string("/tmp"), std::string()}) {
+      MqttConfig options = Options("car-1", "ca");
       (*options.tls).*member = path;
       try {
         const MqttClient car(options, {}, {});
@@ -126,13 +91,13 @@ TEST_F(MqttTlsTest, NamesTheFileThatCannotBeRead) {
 }
 
 TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
-  const MqttConfig options = Options("car-1", "ca.pem");
+  const MqttConfig options = Options("car-1", "ca");
   const MqttClient car(options, {}, {});
   ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
   const std::string& key = options.tls->key_file;
   std::filesystem::rename(key, key + ".away");
   broker_.Kill();
-  StartBroker();
+  broker_.Start();
   EXPECT_TRUE(Eventually([&] {
     return Says(car, "cannot read " + key + ", the bridge's key_file: No such file");
   })) << car.statistics().last_error;
@@ -141,7 +106,12 @@ TEST_F(MqttTlsTest, NamesAFileThatWentAwayAfterTheStartAndGoesOnWhenItIsBack) {
 }
 
 TEST_F(MqttTlsTest, NamesATornFileAndGoesOnWhenItIsWhole) {
-  const MqttConfig options = Options("car-1", "ca.pem");
+  const MqttConfig options = Options("car-1", "ca");
+  {
+    // The broker listens before it has read its own files, of which one is torn here.
+    const MqttClient car(options, {}, {});
+    ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+  }
   for (const auto& [name, path] : {std::pair{"ca_file", options.tls->ca_file},
                                    {"certificate_file", options.tls->certificate_file},
                                    {"key_file", options.tls->key_file}}) {
@@ -160,12 +130,118 @@ TEST_F(MqttTlsTest, NamesATornFileAndGoesOnWhenItIsWhole) {
 }
 
 TEST_F(MqttTlsTest, DoesNotConnectWithTheKeyOfAnotherCertificate) {
-  MqttConfig options = Options("car-1", "ca.pem");
+  MqttConfig options = Options("car-1", "ca");
   options.tls->key_file = File("stranger.key");  // Of another certificate.
   const MqttClient car(options, {}, {});
   EXPECT_TRUE(Eventually([&] { return Says(car, "TLS: key values mismatch"); }))
       << car.statistics().last_error;
   EXPECT_EQ(car.statistics().connections, 0U);
+}
+
+TEST_F(MqttTlsTest, ConnectsToABrokerWithTheFingerprint) {
+  MqttConfig options = Options("car-1", "ca");
+  options.fingerprint = certificates_.FingerprintOf("broker");
+  MqttClient car(options, {}, {});
+  EXPECT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+  car.Publish("livemap/v1/test/notice", {1, 2, 3}, 1, 0);
+  EXPECT_TRUE(Eventually([&] { return car.statistics().published == 1; }));
+  // Also after a loss.
+  broker_.Kill();
+  broker_.Start();
+  EXPECT_TRUE(Eventually([&] { return car.statistics().connections == 2; }))
+      << car.statistics().last_error;
+}
+
+TEST_F(MqttTlsTest, RefusesABrokerWithAnotherFingerprintAndNamesBoth) {
+  MqttConfig options = Options("car-1", "ca");
+  options.fingerprint = certificates_.FingerprintOf("car-1");  // Of the same authority.
+  std::vector<std::string> losses;
+  std::mutex mutex;
+  MqttCallbacks callbacks;
+  callbacks.on_connection = [&](bool, const std::string& reason) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    losses.push_back(reason);
+  };
+  const MqttClient car(options, {}, callbacks);
+  ASSERT_TRUE(Eventually([&] { return car.statistics().connection_failures >= 2; }));
+  EXPECT_EQ(car.statistics().connections, 0U);
+  const std::string sentence = "the broker 127.0.0.1:" + std::to_string(broker_.port()) +
+                               " shows a certificate with the fingerprint " +
+                               certificates_.FingerprintOf("broker") + ", accepted is " +
+                               options.fingerprint;
+  EXPECT_EQ(car.statistics().last_error, sentence);
+  const std::lock_guard<std::mutex> lock(mutex);
+  ASSERT_FALSE(losses.empty());
+  EXPECT_EQ(losses.front(), sentence);
+  EXPECT_EQ(broker_.Log().find("car-1"), std::string::npos) << "nothing was told to the broker";
+}
+
+TEST_F(MqttTlsTest, TakesTheSecondAddressWhenTheFirstHasAnotherFingerprint) {
+  MqttConfig options = Options("car-1", "ca");
+  options.fingerprint = std::string(64, '0');
+  options.fallbacks = {{"127.0.0.1", broker_.port(), certificates_.FingerprintOf("broker")}};
+  std::vector<std::string> events;
+  std::mutex mutex;
+  MqttCallbacks callbacks;
+  callbacks.on_connection = [&](bool connected, const std::string& reason) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    events.push_back(connected ? "connected" : reason);
+  };
+  const MqttClient car(options, {}, callbacks);
+  ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+  EXPECT_EQ(car.statistics().broker, options.fallbacks.front());
+  // That the first is not what it should be is told all the same.
+  EXPECT_THAT(car.statistics().last_error, HasSubstr("accepted is " + options.fingerprint));
+  ASSERT_TRUE(Eventually([&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return events.size() == 2;
+  }));
+  EXPECT_THAT(events[0], HasSubstr("accepted is " + options.fingerprint));
+  EXPECT_EQ(events[1], "connected");
+}
+
+TEST_F(MqttTlsTest, TakesTheSecondAddressWhenTheFirstHasNoCertificateForItsName) {
+  MqttConfig options = Options("car-1", "ca");
+  options.host = "localhost";  // The certificate is for 127.0.0.1.
+  options.fallbacks = {{"127.0.0.1", broker_.port()}};
+  const MqttClient car(options, {}, {});
+  ASSERT_TRUE(Eventually([&] { return car.connected(); })) << car.statistics().last_error;
+  EXPECT_EQ(car.statistics().broker.host, "127.0.0.1");
+}
+
+TEST_F(MqttTlsTest, AFingerprintReplacesNoOtherCheck) {
+  MqttConfig other_name = Options("car-1", "ca");
+  other_name.host = "localhost";  // The certificate is for 127.0.0.1.
+  MqttConfig other_authority = Options("car-1", "other_ca");
+  for (MqttConfig* const options : {&other_name, &other_authority}) {
+    options->fingerprint = certificates_.FingerprintOf("broker");
+    const MqttClient car(*options, {}, {});
+    EXPECT_TRUE(Eventually([&] { return Says(car, "TLS: certificate verify failed"); }))
+        << car.statistics().last_error;
+    EXPECT_EQ(car.statistics().connections, 0U);
+  }
+}
+
+TEST_F(MqttTlsTest, AFingerprintThatCannotBeComparedIsNamed) {
+  MqttConfig without_tls = Options("car-1", "ca");
+  without_tls.tls.reset();
+  without_tls.fingerprint = certificates_.FingerprintOf("broker");
+  MqttConfig in_capitals = Options("car-1", "ca");
+  in_capitals.fallbacks = {{"zone.example.org", 8883, std::string(64, 'A')}};
+  const std::string port = std::to_string(broker_.port());
+  for (const auto& [options, words] :
+       {std::pair{without_tls, "fingerprint of the broker 127.0.0.1:" + port + " is '" +
+                                   without_tls.fingerprint +
+                                   "', accepted is none where ca_file, certificate_file"},
+        {in_capitals, "fingerprint of the broker zone.example.org:8883 is '" +
+                          std::string(64, 'A') + "', accepted is 64 hex digits"}}) {
+    try {
+      const MqttClient car(options, {}, {});
+      ADD_FAILURE() << "accepted, not refused by: " << words;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(words));
+    }
+  }
 }
 
 /// A zone as `livemap zone` makes it, with its broker.

@@ -223,9 +223,13 @@ class MqttBridgePart : public NodeletPart {
     for (const std::string& id : handover_->Wanted(SteadyS(), connections_->Waiting())) {
       auto zone = FindZone(id, directory.get());
       // A broker keeps one connection of a user: a second one would end the first.
-      const auto shares_broker = [&zone](const ZoneConnections::Zone& other) {
+      const auto is_same_place = [](const transport::MqttAddress& one,
+                                    const transport::MqttAddress& other) {
+        return one.host == other.host && one.port == other.port;
+      };
+      const auto shares_broker = [&](const ZoneConnections::Zone& other) {
         return std::find_first_of(other.brokers.begin(), other.brokers.end(), zone->brokers.begin(),
-                                  zone->brokers.end()) != other.brokers.end();
+                                  zone->brokers.end(), is_same_place) != other.brokers.end();
       };
       if (zone && std::none_of(zones.begin(), zones.end(), shares_broker)) {
         zones.push_back(std::move(*zone));
@@ -246,7 +250,7 @@ class MqttBridgePart : public NodeletPart {
     if (found) {
       ZoneConnections::Zone zone{id, {}};
       for (const directory::BrokerAddress& broker : directory->zones()[*found].brokers) {
-        zone.brokers.push_back({broker.host, broker.port});
+        zone.brokers.push_back({broker.host, broker.port, broker.fingerprint});
       }
       return zone;
     }

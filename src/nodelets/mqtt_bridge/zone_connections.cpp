@@ -5,13 +5,18 @@
 #include <future>
 #include <utility>
 
+#include "common/error.h"
+#include "transport/mosquitto_handle.h"
+
 namespace livemap::nodelets {
 
 ZoneConnections::ZoneConnections(transport::MqttConfig config, SubscriptionsOf subscriptions_of,
                                  Events events)
     : config_(std::move(config)),
       subscriptions_of_(std::move(subscriptions_of)),
-      events_(std::move(events)) {}
+      events_(std::move(events)) {
+  transport::CheckMqttOptions(config_);
+}
 
 void ZoneConnections::Keep(const std::vector<Zone>& zones) {
   const auto is_kept = [&zones](const auto& connection) {
@@ -37,29 +42,43 @@ void ZoneConnections::Keep(const std::vector<Zone>& zones) {
                                }),
                 ending_.end());
   for (const Zone& zone : zones) {
-    if (connections_.count(zone.id) != 0) continue;
-    connections_[zone.id] = {zone.brokers, Connect(zone)};
+    Connection& connection = connections_[zone.id];
+    connection.brokers = zone.brokers;
+    if (!connection.client) Connect(zone.id, connection);
   }
 }
 
-std::unique_ptr<transport::MqttClient> ZoneConnections::Connect(const Zone& zone) const {
+void ZoneConnections::Connect(const std::string& zone, Connection& connection) const {
+  try {
+    connection.client = MakeClient(zone, connection.brokers);
+    connection.fault.clear();
+  } catch (const Error& error) {
+    if (connection.fault == error.what()) return;
+    connection.fault = error.what();
+    if (events_.on_connection) events_.on_connection(zone, false, connection.fault);
+  }
+}
+
+std::unique_ptr<transport::MqttClient> ZoneConnections::MakeClient(
+    const std::string& zone, const std::vector<transport::MqttAddress>& brokers) const {
   transport::MqttConfig config = config_;
-  config.host = zone.brokers.front().host;
-  config.port = zone.brokers.front().port;
-  config.fallbacks.assign(zone.brokers.begin() + 1, zone.brokers.end());
+  config.host = brokers.front().host;
+  config.port = brokers.front().port;
+  config.fingerprint = brokers.front().fingerprint;
+  config.fallbacks.assign(brokers.begin() + 1, brokers.end());
   transport::MqttCallbacks callbacks;
   callbacks.on_published = events_.on_published;
   if (events_.on_message) {
-    callbacks.on_message = [this, id = zone.id](const transport::MqttMessage& message) {
+    callbacks.on_message = [this, id = zone](const transport::MqttMessage& message) {
       events_.on_message(id, message);
     };
   }
   if (events_.on_connection) {
-    callbacks.on_connection = [this, id = zone.id](bool connected, const std::string& reason) {
+    callbacks.on_connection = [this, id = zone](bool connected, const std::string& reason) {
       events_.on_connection(id, connected, reason);
     };
   }
-  return std::make_unique<transport::MqttClient>(config, subscriptions_of_(zone.id),
+  return std::make_unique<transport::MqttClient>(config, subscriptions_of_(zone),
                                                  std::move(callbacks));
 }
 
@@ -71,6 +90,7 @@ transport::MqttClient* ZoneConnections::Find(const std::string& zone) const {
 std::vector<std::string> ZoneConnections::Waiting() const {
   std::vector<std::string> zones;
   for (const auto& [zone, connection] : connections_) {
+    if (!connection.client) continue;
     const transport::MqttStatistics statistics = connection.client->statistics();
     if (statistics.queued + statistics.inflight > 0) zones.push_back(zone);
   }
@@ -80,7 +100,12 @@ std::vector<std::string> ZoneConnections::Waiting() const {
 std::map<std::string, transport::MqttStatistics> ZoneConnections::Statistics() const {
   std::map<std::string, transport::MqttStatistics> statistics;
   for (const auto& [zone, connection] : connections_) {
-    statistics[zone] = connection.client->statistics();
+    if (connection.client) {
+      statistics[zone] = connection.client->statistics();
+      continue;
+    }
+    statistics[zone].broker = connection.brokers.front();
+    statistics[zone].last_error = connection.fault;
   }
   return statistics;
 }

@@ -11,8 +11,9 @@
 
 namespace livemap::nodelets {
 
-/// The bridge's connections to brokers, one for each zone. Not thread-safe; what it calls, it calls
-/// on the network threads of the connections.
+/// The bridge's connections to brokers, one for each zone. Not thread-safe. It calls its events on
+/// the network threads of the connections, and on_connection in Keep, too, where a connection
+/// cannot be made.
 ///
 /// Typical usage:
 ///
@@ -39,12 +40,15 @@ class ZoneConnections {
   using SubscriptionsOf =
       std::function<std::vector<transport::MqttSubscription>(const std::string&)>;
 
-  /// `config` is that of each connection but for the broker's address.
+  /// `config` is that of each connection but for the broker's address. Throws Error naming a bad
+  /// option.
   ZoneConnections(transport::MqttConfig config, SubscriptionsOf subscriptions_of, Events events);
 
   /// Connects to `zones` and ends all other connections. Those that stand stay, unless their
   /// brokers have changed; then what waits there is lost. One that ends may do so
-  /// after this returns. Throws Error naming a bad option.
+  /// after this returns. A zone whose connection cannot be made (a fingerprint without TLS, a key
+  /// file that is gone) is told by on_connection, takes nothing from the others, and is tried again
+  /// at the next call.
   void Keep(const std::vector<Zone>& zones);
 
   /// The connection to a zone; null: there is none.
@@ -57,10 +61,13 @@ class ZoneConnections {
  private:
   struct Connection {
     std::vector<transport::MqttAddress> brokers;
-    std::unique_ptr<transport::MqttClient> client;
+    std::unique_ptr<transport::MqttClient> client;  ///< Null: it could not be made.
+    std::string fault;                              ///< Why not.
   };
 
-  std::unique_ptr<transport::MqttClient> Connect(const Zone& zone) const;
+  void Connect(const std::string& zone, Connection& connection) const;
+  std::unique_ptr<transport::MqttClient> MakeClient(
+      const std::string& zone, const std::vector<transport::MqttAddress>& brokers) const;
 
   const transport::MqttConfig config_;
   const SubscriptionsOf subscriptions_of_;

@@ -8,7 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "common/error.h"
 #include "test/transport/broker_process.h"
+#include "test/transport/tls_broker.h"
 #include "test/transport/waiting.h"
 
 namespace livemap::nodelets {
@@ -237,6 +239,91 @@ TEST_F(ZoneConnectionsTest, StatisticsAreThoseOfEachZone) {
   EXPECT_FALSE(statistics.at("gone").connected);
   EXPECT_EQ(statistics.at("gone").published, 0U);
   EXPECT_NE(statistics.at("gone").last_error, "");
+}
+
+TEST_F(ZoneConnectionsTest, AFingerprintWithoutTlsKeepsTheZoneAwayAndNoOther) {
+  const std::string fingerprint(64, 'a');
+  const ZoneConnections::Zone marked{"marked", {{"127.0.0.1", east_.port(), fingerprint}}};
+  for (int i = 0; i < 2; ++i) connections_.Keep({marked, At("west", west_)});
+  EXPECT_TRUE(Eventually([this] { return IsConnected("west"); }));
+  EXPECT_EQ(connections_.Find("marked"), nullptr);
+  EXPECT_THAT(connections_.Waiting(), IsEmpty());
+  const transport::MqttStatistics statistics = connections_.Statistics().at("marked");
+  EXPECT_FALSE(statistics.connected);
+  EXPECT_EQ(statistics.broker.port, east_.port());
+  EXPECT_THAT(statistics.last_error,
+              HasSubstr("'" + fingerprint + "', accepted is none where ca_file"));
+  EXPECT_THAT(losses(), ElementsAre(Pair("marked", ElementsAre(statistics.last_error))));
+  // A newer directory says something else.
+  connections_.Keep({At("marked", east_), At("west", west_)});
+  EXPECT_TRUE(Eventually([this] { return IsConnected("marked"); }));
+}
+
+TEST(ZoneConnectionsConfigTest, ABadOptionIsNamedAtTheStart) {
+  transport::MqttConfig config;
+  config.client_id = "car-1";
+  config.keepalive_s = 1;
+  try {
+    const ZoneConnections connections(config, {}, {});
+    ADD_FAILURE() << "it was accepted";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("keepalive_s is '1'"));
+  }
+}
+
+/// A vehicle and the brokers of two zones, with certificates of one authority.
+class ZoneConnectionsTlsTest : public ::testing::Test {
+ protected:
+  ZoneConnectionsTlsTest() {
+    west_.Start();
+    east_.Start();
+  }
+
+  transport::MqttConfig Config() const {
+    transport::MqttConfig config;
+    config.client_id = "car-1";
+    config.reconnect_min_s = 0.05;
+    config.reconnect_max_s = 0.2;
+    config.tls = certificates_.Tls("car-1");
+    return config;
+  }
+
+  std::string FingerprintOf(const std::string& name) const {
+    return certificates_.FingerprintOf(name);
+  }
+
+  const transport::TestCertificates certificates_;
+  transport::TlsBroker west_{certificates_, "broker"};
+  transport::TlsBroker east_{certificates_, "other_broker"};
+};
+
+TEST_F(ZoneConnectionsTlsTest, OneIdentityIsConnectedToTwoZonesAtOnce) {
+  ZoneConnections connections(
+      Config(), [](const std::string&) { return std::vector<transport::MqttSubscription>(); }, {});
+  connections.Keep({{"west", {{"127.0.0.1", west_.port(), FingerprintOf("broker")}}},
+                    {"east", {{"127.0.0.1", east_.port(), FingerprintOf("other_broker")}}}});
+  for (const std::string zone : {"west", "east"}) {
+    transport::MqttClient& client = *connections.Find(zone);
+    EXPECT_TRUE(Eventually([&] { return client.connected(); })) << client.statistics().last_error;
+    client.Publish("livemap/v1/" + zone + "/vehicle/car-1/report", BytesOf("hole"), 1, 0);
+    EXPECT_TRUE(Eventually([&] { return client.statistics().published == 1; }));
+  }
+  for (const auto& [zone, statistics] : connections.Statistics()) {
+    EXPECT_TRUE(statistics.connected) << zone;
+    EXPECT_EQ(statistics.connections, 1U) << zone;
+  }
+}
+
+TEST_F(ZoneConnectionsTlsTest, OneZonesBrokerIsNotTakenForAnothersOfTheSameAuthority) {
+  ZoneConnections connections(
+      Config(), [](const std::string&) { return std::vector<transport::MqttSubscription>(); }, {});
+  // The second address is the zone's own broker.
+  connections.Keep({{"east",
+                     {{"127.0.0.1", west_.port(), FingerprintOf("other_broker")},
+                      {"127.0.0.1", east_.port(), FingerprintOf("other_broker")}}}});
+  transport::MqttClient& client = *connections.Find("east");
+  ASSERT_TRUE(Eventually([&] { return client.connected(); })) << client.statistics().last_error;
+  EXPECT_EQ(client.statistics().broker.port, east_.port());
 }
 
 }  // namespace
