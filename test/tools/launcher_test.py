@@ -3,8 +3,10 @@
 
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
+import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -43,9 +45,9 @@ class LauncherTest(unittest.TestCase):
         (self.tools / name).write_text(f"#!/bin/sh\n{text}\n")
         (self.tools / name).chmod(0o755)
 
-    def call(self, *command):
+    def call(self, *command, before=()):
         environment = {**os.environ, "PATH": f"{self.tools}:/usr/bin:/bin"}
-        return subprocess.run([str(self.tree / "livemap"), *command], env=environment, capture_output=True,
+        return subprocess.run([*before, str(self.tree / "livemap"), *command], env=environment, capture_output=True,
                               text=True, timeout=60)
 
     def wanted_by(self, *command):
@@ -93,6 +95,42 @@ class LauncherTest(unittest.TestCase):
         answer = self.call("setup")
         self.assertIn("livemap: building", answer.stderr)
         self.assertFalse((objects / "torn.o").exists())
+
+    def built(self):
+        """The tree as a build leaves it, for whoever asks for its stamp."""
+        (self.tree / "scripts").unlink()
+        (self.tree / "scripts/lib").mkdir(parents=True)
+        install = self.tree / "install"
+        install.mkdir()
+        (install / "setup.bash").write_text("true\n", encoding="utf-8")
+        time_of_build = time.time() + 1
+        (install / ".livemap-built-run").touch()
+        os.utime(install / ".livemap-built-run", (time_of_build, time_of_build))
+        return time_of_build
+
+    def test_what_python_keeps_of_a_script_asks_for_no_build(self):
+        """A script that root starts leaves it in the clone: a service, which may not write there, started no more."""
+        self.stub("dpkg-query", f"sed -n 's/^[a-z].*/& installed/p' '{ROOT}/apt-packages.txt'")
+        after = self.built() + 1
+        folder = self.tree / "scripts/lib"
+        (folder / "__pycache__").mkdir()
+        for path in (folder / "__pycache__", folder):
+            os.utime(path, (after, after))
+        self.assertNotIn("building", self.call("setup").stderr)
+        (folder / "new.py").touch()
+        os.utime(folder / "new.py", (after, after))
+        self.assertIn("livemap: building", self.call("setup").stderr)
+
+    @unittest.skipIf(os.geteuid() == 0 and not shutil.which("setpriv"), "root may write everywhere")
+    def test_who_may_not_build_is_told_who_can(self):
+        self.stub("dpkg-query", f"sed -n 's/^[a-z].*/& installed/p' '{ROOT}/apt-packages.txt'")
+        (self.tree / "build").mkdir()
+        (self.tree / "build").chmod(0o555)
+        self.tree.chmod(0o755)
+        as_other = ["setpriv", "--reuid", "65534", "--clear-groups"] if os.geteuid() == 0 else []
+        answer = self.call("setup", before=as_other)
+        self.assertEqual(answer.returncode, 2, answer.stderr)
+        self.assertRegex(answer.stderr, r"^livemap: what is in .* is not built, .* may not write there: sudo .*/livemap setup builds it\n$")
 
     def test_a_wrong_argument_of_setup_is_refused_with_what_is_accepted(self):
         for arguments in (["--development"], ["--dev", "now"]):
