@@ -1,12 +1,18 @@
 #!/usr/bin/python3
 """livemap vehicle install and zone install write units that systemd takes, or nothing."""
 
+import contextlib
 import getpass
+import importlib.machinery
+import importlib.util
+import io
+import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -38,7 +44,7 @@ class ServiceTest(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             unit = self.unit(kind)
             self.assertIn(f'ExecStart="{ROOT}/livemap" "{kind}" "zone:=town"\n', unit)
-            for line in ("Restart=always", "StartLimitIntervalSec=0", "WantedBy=multi-user.target"):
+            for line in ("UMask=0077", "Restart=always", "StartLimitIntervalSec=0", "WantedBy=multi-user.target"):
                 self.assertIn(line + "\n", unit)
         checker = shutil.which("systemd-analyze")
         if not checker:
@@ -73,6 +79,7 @@ class ServiceTest(unittest.TestCase):
         self.assert_refused(self.install("vehicle", "camera_info_url:=file://~/camera.yaml"), "camera.yaml", "whole path")
         self.assert_refused(self.install("vehicle", "identity:=car-1"), "car-1", "whole path")
         self.assert_refused(self.install("zone", "work_orders:=orders.yaml"), "orders.yaml", "whole path")
+        self.assert_refused(self.install("zone", "web_certificate:=fullchain.pem"), "fullchain.pem", "whole path")
         self.assert_refused(self.install("vehicle", "--master-port", "80"), "80", "1024")
         self.assert_refused(self.install("vehicle", "vehicle:=car\n[Service]\nUser=root"), "control character")
         self.assert_refused(self.install("vehicle", "--user", "nobody-of-this-name"), "nobody-of-this-name")
@@ -91,6 +98,23 @@ class ServiceTest(unittest.TestCase):
         self.install("zone")
         self.assertIn("ROS_MASTER_URI=http://localhost:11311\n", self.unit("vehicle"))
         self.assertIn("ROS_MASTER_URI=http://localhost:11312\n", self.unit("zone"))
+
+    def test_a_service_that_runs_gets_its_new_arguments(self):
+        """systemctl enable --now leaves what runs as it is. No test may call systemctl: a stub notes how it is called."""
+        loader = importlib.machinery.SourceFileLoader("livemap_service", str(ROOT / "scripts/livemap_service"))
+        service = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+        dont_write, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+        try:
+            loader.exec_module(service)
+        finally:
+            sys.dont_write_bytecode = dont_write
+        called = []
+        service.UNITS, service.systemctl = str(self.units), lambda *arguments: called.append(arguments)
+        service.os = types.SimpleNamespace(**{**vars(os), "geteuid": lambda: 0})
+        with contextlib.redirect_stdout(io.StringIO()):
+            status = service.main(["zone", str(ROOT), "--user", getpass.getuser(), "--units", str(self.units)])
+        self.assertEqual(status, 0)
+        self.assertEqual(called, [("daemon-reload",), ("enable", "livemap-zone.service"), ("restart", "livemap-zone.service")])
 
     def test_a_unit_is_removed_again(self):
         self.assert_refused(self.install("zone", "--remove"), "livemap-zone.service")
