@@ -110,7 +110,7 @@ std::vector<double> TurnProbabilities(const TurnConfig& config, const Approach& 
   if (!approach.in_roundabout) sum *= SpeedStraight(config, approach, slowest_mps);
   for (const TurnOption& option : options) {
     const bool straight = std::abs(option.angle_rad) < config.straight_rad;
-    double share = straight ? config.straight_weight : config.turn_weight;
+    double share = straight ? config.straight_weight : config.turn_weight * approach.turn_habit;
     if (approach.in_roundabout) share = RingShare(config, approach, option);
     if (option.same_street && !approach.in_roundabout) share *= config.same_street_weight;
     if (option.lesser) share *= config.lesser_weight;

@@ -14,6 +14,7 @@ struct Approach {
   double bend_sigma_rad = 0;   ///< Of bend_rad, as the course is known.
   bool bend_known = false;     ///< Whether bend_rad is known.
   bool in_roundabout = false;  ///< The street until the junction is the ring of a roundabout.
+  double turn_habit = 1;       ///< Factor of the weight of turns; TurnHabit has it.
   int exits_left = 0;          ///< Of the ring until where the vehicle came in; 0: not known.
 };
 

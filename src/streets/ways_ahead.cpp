@@ -117,6 +117,7 @@ std::vector<double> WaysAhead::SharesOf(const Leg& leg, const std::vector<Travel
   approach.speed_mps = driving_.speed_mps;
   approach.push_mps2 = driving_.push_mps2;
   approach.usual_mps = driving_.usual_mps;
+  approach.turn_habit = driving_.turn_habit;
   const Street& street = map_.StreetOf(leg.travel.segment);
   approach.in_roundabout = street.roundabout;
   if (street.roundabout) {

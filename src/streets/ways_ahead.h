@@ -21,6 +21,7 @@ struct Driving {
   double course_rad = 0;  ///< Clockwise from north.
   double course_sigma_rad = 0;
   bool course_known = false;
+  double turn_habit = 1;  ///< Of the driver; TurnHabit has it.
   /// Towards or in a junction: the street by which the vehicle comes to it.
   std::optional<Travel> approach;
   /// In a roundabout: the node of the ring at which the vehicle came in.

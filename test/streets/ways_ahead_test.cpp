@@ -68,6 +68,15 @@ TEST_F(WaysAheadTest, FarFromAJunctionAllWaysArePossible) {
 
 TEST_F(WaysAheadTest, WhoDoesNotBrakeGoesStraightOn) { EXPECT_GT(Shares(70, Steady(14))[0], 0.9); }
 
+TEST_F(WaysAheadTest, AHabitOfPassingCrossingsMakesStraightOnLikelier) {
+  Driving driving = Steady(14);
+  const double of_all = Shares(10, driving)[0];
+  driving.turn_habit = 0.2;
+  EXPECT_GT(Shares(10, driving)[0], of_all + 0.1);
+  driving.turn_habit = 3;
+  EXPECT_LT(Shares(10, driving)[0], of_all - 0.1);
+}
+
 TEST_F(WaysAheadTest, WhoBrakesInTimeTurns) {
   Driving driving = Steady(9);
   driving.usual_mps = 14;

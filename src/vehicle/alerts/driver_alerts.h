@@ -142,6 +142,8 @@ class DriverAlerts {
   const CourseFilter& course() const { return filter_; }
   /// That the vehicle is on a street of its map; 0 without one.
   double on_street() const { return street_way_ ? street_way_->on_street() : 0; }
+  /// The driver's odds to turn at a junction against those of all drivers; 1 without a map.
+  double turn_habit() const { return street_way_ ? street_way_->turn_habit() : 1; }
 
  private:
   /// A hazard near the vehicle.

@@ -37,12 +37,13 @@ Beside BesideOf(const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m,
 }  // namespace
 
 StreetWay::StreetWay(std::shared_ptr<const streets::StreetMap> map, const Config& config)
-    : map_(std::move(map)), config_(config), matcher_(map_, config.matcher) {}
+    : map_(std::move(map)), config_(config), matcher_(map_, config.matcher), habit_(config.habit) {}
 
 void StreetWay::Reset() {
   matcher_.Reset();
   usual_mps_ = 0;
   last_.reset();
+  habit_.Reset();
   approach_.reset();
   ring_entry_.reset();
   legs_.clear();
@@ -80,6 +81,7 @@ void StreetWay::FollowJunction() {
                        likeliest.travel.segment != approach_->segment &&
                        likeliest.along_m <= zone_m;
     if (in_it || likeliest.travel == *approach_) return;
+    NotePassed(*approach_, likeliest.travel);
     approach_.reset();
   }
   const streets::Street& street = map_->StreetOf(likeliest.travel.segment);
@@ -92,6 +94,29 @@ void StreetWay::FollowJunction() {
   if (choice && !street.roundabout) approach_ = likeliest.travel;
 }
 
+/// From the direction of one travel to that of another, without a sign.
+double StreetWay::AngleRad(const streets::Travel& from, const streets::Travel& onto) const {
+  const geo::LocalFrame frame(map_->PlaceOf(map_->EndOf(from)));
+  const auto direction = [&](const streets::Travel& travel) -> Eigen::Vector2d {
+    return frame.ToEnu(map_->PlaceOf(map_->EndOf(travel))) -
+           frame.ToEnu(map_->PlaceOf(map_->StartOf(travel)));
+  };
+  const double cosine = direction(from).stableNormalized().dot(direction(onto).stableNormalized());
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+/// Learns whether the driver turns, where straight on and turns were possible.
+void StreetWay::NotePassed(const streets::Travel& approach, const streets::Travel& now) {
+  bool straight = false;
+  bool turn = false;
+  const double straight_rad = config_.ways.turns.straight_rad;
+  for (const streets::Travel& onto : map_->Continuations(approach)) {
+    if (map_->StreetOf(onto.segment).roundabout) return;
+    (AngleRad(approach, onto) < straight_rad ? straight : turn) = true;
+  }
+  if (straight && turn) habit_.Passed(AngleRad(approach, now) >= straight_rad);
+}
+
 void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filter, double way_m) {
   streets::Driving driving;
   driving.speed_mps = filter.state()[CourseFilter::kSpeed];
@@ -101,6 +126,7 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
   driving.course_known = driving.speed_mps >= config_.bend_from_mps;
   driving.course_sigma_rad =
       std::sqrt(std::max(0.0, filter.covariance()(CourseFilter::kCourse, CourseFilter::kCourse)));
+  driving.turn_habit = habit_.factor();
   driving.approach = approach_;
   driving.ring_entry = ring_entry_;
   const double reach_m = std::min(way_m, kMaxWayM);

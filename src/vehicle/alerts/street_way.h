@@ -9,6 +9,7 @@
 #include "geo/wgs84.h"
 #include "streets/street_map.h"
 #include "streets/street_matcher.h"
+#include "streets/turn_habit.h"
 #include "streets/ways_ahead.h"
 #include "vehicle/alerts/course_filter.h"
 
@@ -34,6 +35,7 @@ class StreetWay {
     double matched_fraction = 1;  ///< Of the fix's stated sigma that the matcher believes.
     streets::StreetMatcher::Config matcher;
     streets::WaysAhead::Config ways;
+    streets::TurnHabit::Config habit;
   };
 
   /// How a place lies to the streets ahead.
@@ -65,6 +67,8 @@ class StreetWay {
   double on_street() const { return matcher_.on_street(); }
   /// Speed on the way until here, before the vehicle began to brake, m/s.
   double usual_mps() const { return usual_mps_; }
+  /// The driver's odds to turn at a junction, as streets::TurnHabit has them.
+  double turn_habit() const { return habit_.factor(); }
   const streets::StreetMatcher& matcher() const { return matcher_; }
 
  private:
@@ -86,6 +90,8 @@ class StreetWay {
   };
 
   void FollowJunction();
+  void NotePassed(const streets::Travel& approach, const streets::Travel& now);
+  double AngleRad(const streets::Travel& from, const streets::Travel& onto) const;
   std::optional<std::uint32_t> RingEntryAhead() const;
   double Density(double off_m, double half_width_m, double variance_m2) const;
   std::vector<OtherNear> OthersNear(const Eigen::Vector2d& place_m, double variance_m2) const;
@@ -97,6 +103,7 @@ class StreetWay {
   streets::StreetMatcher matcher_;
   double usual_mps_ = 0;
   std::optional<geo::GeoPoint> last_;
+  streets::TurnHabit habit_;
   std::optional<streets::Travel> approach_;  // To the junction that the vehicle comes to or is in.
   std::optional<std::uint32_t> ring_entry_;  // Node at which it came into a roundabout.
   std::vector<streets::Leg> legs_;

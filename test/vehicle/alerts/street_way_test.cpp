@@ -198,6 +198,34 @@ TEST_F(StreetWayTest, WhereTheMapEndsTheCourseCounts) {
   EXPECT_TRUE(IsTold(1));
 }
 
+TEST_F(StreetWayTest, WhoPassesCrossingsIsTakenToPassTheNext) {
+  for (int i = 0; i < 9; ++i) {
+    drawn_.Add({{0, 150.0 * i}, {0, 150.0 * (i + 1)}});
+    drawn_.Add({{-100, 150.0 * (i + 1)}, {0, 150.0 * (i + 1)}, {100, 150.0 * (i + 1)}});
+  }
+  Begin();
+  DriveTo(0, 1340, 14);
+  EXPECT_LT(alerts_->turn_habit(), 0.5);
+}
+
+TEST_F(StreetWayTest, WhoTurnsAtEachCrossingIsTakenToTurnAtTheNext) {
+  // Stairs: at each corner the street goes on straight, too.
+  for (int i = 0; i < 8; ++i) {
+    const double corner_m = 100.0 * i;
+    drawn_.Add({{corner_m, corner_m}, {corner_m, corner_m + 100}, {corner_m, corner_m + 180}});
+    drawn_.Add({{corner_m, corner_m + 100}, {corner_m + 100, corner_m + 100}});
+    drawn_.Add({{corner_m + 100, corner_m + 100}, {corner_m + 180, corner_m + 100}});
+  }
+  Begin();
+  for (int i = 0; i < 7; ++i) {
+    DriveTo(100.0 * i, 100.0 * i + 100, 6);
+    DriveTo(100.0 * i + 100, 100.0 * i + 100, 6);
+  }
+  EXPECT_GT(alerts_->turn_habit(), 1.5);
+  alerts_->StartAnew();
+  EXPECT_DOUBLE_EQ(alerts_->turn_habit(), 1);
+}
+
 TEST_F(StreetWayTest, StartingAnewForgetsTheStreet) {
   drawn_.Add({{0, 0}, {0, 600}});
   Begin();
