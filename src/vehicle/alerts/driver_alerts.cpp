@@ -131,10 +131,10 @@ void DriverAlerts::FollowVehicle(const geo::GeoPoint& position) {
 }
 
 /// How far the vehicle comes in a time: its acceleration fades, and it does not drive backwards.
-double DriverAlerts::ReachM(double time_s) const {
+double DriverAlerts::ReachM(double time_s, bool may_start) const {
   const double speed = filter_.state()[CourseFilter::kSpeed];
   double push = filter_.state()[CourseFilter::kAcceleration];
-  if (speed < config_.starting_speed_mps) push = std::max(push, config_.starting_mps2);
+  if (may_start && speed < config_.starting_speed_mps) push = std::max(push, config_.starting_mps2);
   const double fading_s = config_.course.acceleration_time_s;
   const double fade = fading_s * (1 - std::exp(-time_s / fading_s));
   const double reach_m = speed * time_s + push * fading_s * (time_s - fade);
@@ -281,10 +281,11 @@ bool DriverAlerts::IsDue(const Near& near) const {
   const double lead_s = LeadS(near.alert.urgency, speed);
   const double wait_s =
       (near.unsure ? std::min(lead_s, config_.unsure_lead_s) : lead_s) + filter_.period_s();
-  double reach_m = ReachM(wait_s);
-  // Before a junction, who brakes is not taken to speed up again at once.
+  // Before a junction, who brakes is not taken to speed up again at once: waiting tells whether the
+  // vehicle turns. Where the way is clear all the same, the driver is told before it stops.
   const bool brakes =
       filter_.state()[CourseFilter::kAcceleration] < -config_.brakes_from_mps2 && near.unsure;
+  double reach_m = ReachM(wait_s, !brakes || probability >= config_.at_once_above);
   if ((near.unsure || near.on_way) && !brakes) {
     reach_m = std::max(reach_m, ReachOnStreetM(wait_s));
   }

@@ -162,7 +162,7 @@ class DriverAlerts {
   };
 
   void FollowVehicle(const geo::GeoPoint& position);
-  double ReachM(double time_s) const;
+  double ReachM(double time_s, bool may_start = true) const;
   double ReachOnStreetM(double time_s) const;
   WayAhead::Relation RelationOf(const WayAhead& way, const Known& known, double fix_variance_m2,
                                 Near& near) const;

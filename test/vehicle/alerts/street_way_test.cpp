@@ -226,6 +226,20 @@ TEST_F(StreetWayTest, WhoTurnsAtEachCrossingIsTakenToTurnAtTheNext) {
   EXPECT_DOUBLE_EQ(alerts_->turn_habit(), 1);
 }
 
+TEST_F(StreetWayTest, WhoBrakesBeforeACrossingIsNotTakenToSpeedUpThere) {
+  drawn_.Add({{0, 0}, {0, 400}});
+  drawn_.Add({{0, 400}, {0, 800}});
+  drawn_.Add({{-200, 400}, {0, 400}, {200, 400}});
+  Begin();
+  PutHazard(1, 0, 418);
+  DriveTo(0, 340, 13);
+  // It brakes by 1.5 m/s^2 towards the crossing.
+  for (double speed_mps = 13; speed_mps > 4.5; speed_mps -= 1.5 * kMomentS) {
+    DriveTo(0, place_m_.y() + speed_mps * kMomentS * 1.01, speed_mps);
+  }
+  EXPECT_FALSE(IsTold(1)) << "it may turn, and " << 418 - place_m_.y() << " m take 6 s";
+}
+
 TEST_F(StreetWayTest, StartingAnewForgetsTheStreet) {
   drawn_.Add({{0, 0}, {0, 600}});
   Begin();
