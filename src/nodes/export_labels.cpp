@@ -8,6 +8,7 @@
 #include "zone/labels/label_export.h"
 #include "zone/store/postgresql_url.h"
 
+namespace livemap::nodes {
 namespace {
 
 constexpr char kExportHelp[] =
@@ -74,8 +75,10 @@ void Tell(const livemap::zone::LabelExport& done, const std::string& out) {
 }
 
 }  // namespace
+}  // namespace livemap::nodes
 
 int main(int argc, char** argv) {
+  using namespace livemap::nodes;
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& word : words) {
     if (word != "--help" && word != "-h") continue;

@@ -17,6 +17,7 @@
 #include "directory/directory_keeper.h"
 #include "directory/signed_document.h"
 
+namespace livemap::nodes {
 namespace {
 
 using livemap::Error;
@@ -71,7 +72,7 @@ DirectoryArguments ParseDirectoryArguments(const std::vector<std::string>& words
     return words[next++];
   };
   while (next < words.size()) {
-    const std::string word = words[next++];
+    const std::string& word = words[next++];
     if (word == "--authority") {
       arguments.authority = take(word);
     } else if (word == "--at") {
@@ -148,8 +149,10 @@ void Show(const DirectoryArguments& arguments) {
 }
 
 }  // namespace
+}  // namespace livemap::nodes
 
 int main(int argc, char** argv) {
+  using namespace livemap::nodes;
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& word : words) {
     if (word != "--help" && word != "-h") continue;

@@ -21,6 +21,7 @@
 #include "zone/store/postgresql_url.h"
 #include "zone/store/zone_store.h"
 
+namespace livemap::nodes {
 namespace {
 
 using livemap::Error;
@@ -175,8 +176,10 @@ void Run(const Arguments& arguments) {
 }
 
 }  // namespace
+}  // namespace livemap::nodes
 
 int main(int argc, char** argv) {
+  using namespace livemap::nodes;
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& word : words) {
     if (word != "--help" && word != "-h") continue;

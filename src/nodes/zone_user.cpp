@@ -16,6 +16,7 @@
 #include "common/error.h"
 #include "common/utc_text.h"
 
+namespace livemap::nodes {
 namespace {
 
 using livemap::Error;
@@ -194,8 +195,10 @@ void Run(const Arguments& arguments) {
 }
 
 }  // namespace
+}  // namespace livemap::nodes
 
 int main(int argc, char** argv) {
+  using namespace livemap::nodes;
   const std::vector<std::string> words(argv + 1, argv + argc);
   for (const std::string& word : words) {
     if (word != "--help" && word != "-h") continue;

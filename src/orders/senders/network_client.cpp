@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <memory>
 #include <utility>
 
@@ -64,7 +63,7 @@ struct MessageReader {
 std::size_t GiveMessage(char* data, std::size_t size, std::size_t count, void* user) {
   auto& reader = *static_cast<MessageReader*>(user);
   const std::size_t bytes = std::min(size * count, reader.message.size() - reader.at);
-  std::memcpy(data, reader.message.data() + reader.at, bytes);
+  std::copy_n(reader.message.data() + reader.at, bytes, data);
   reader.at += bytes;
   return bytes;
 }

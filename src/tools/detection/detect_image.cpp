@@ -83,10 +83,11 @@ nlohmann::ordered_json DetectedImageJson(const std::string& path, cv::Size size,
   return json;
 }
 
-void DrawDetectedImage(cv::Mat image, const std::vector<perception::HazardDetection>& found,
+void DrawDetectedImage(const cv::Mat& image, const std::vector<perception::HazardDetection>& found,
                        const std::string& path) {
-  perception::AnnotateImage(image, found);
-  if (!cv::imwrite(path, image)) throw Error("'" + path + "' cannot be written");
+  cv::Mat drawn = image;
+  perception::AnnotateImage(drawn, found);
+  if (!cv::imwrite(path, drawn)) throw Error("'" + path + "' cannot be written");
 }
 
 int DetectImage(int argc, char** argv) {

@@ -183,7 +183,9 @@ class Measurement {
         detector_(perception::ReadModelManifest(options.model), options.threads),
         mask_(options.mask) {}
 
-  void Measure(const std::string& name, cv::Mat image) {
+  /// Masks what it finds in the photo itself.
+  void Measure(const std::string& name, const cv::Mat& photo) {
+    cv::Mat image = photo;
     std::vector<perception::HazardDetection> hazards;
     detection_ms_.push_back(MaskingMilliseconds([&] { hazards = detector_.Detect(image); }));
     if (options_.hazards) {
