@@ -7,6 +7,7 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
+#include "common/utc_text.h"
 #include "web/api/query.h"
 #include "web/http/request_body.h"
 #include "web/json/json.h"
