@@ -17,20 +17,21 @@ function(livemap_module name)
   endif()
 endfunction()
 
-# livemap_gtest(NAME SOURCES a_test.cpp ... [THREADED b_test.cpp ...] DEPENDS target ...)
+# livemap_gtest(NAME [COMPUTES] SOURCES a_test.cpp ... [THREADED b_test.cpp ...] DEPENDS target ...)
 #
 # A GoogleTest program that ctest runs as NAME. Tests that want files of the source tree read
 # LIVEMAP_SOURCE_DIR; the ones that want the real drives read LIVEMAP_DATA_DIR (environment, else
 # ../shared/data beside the source tree) and say "skipped, no data" where it is absent. Sources named
 # by THREADED have several threads: ThreadSanitizer's build of the program has these alone, as the
-# others take minutes to compile and tell it nothing.
+# others take minutes to compile and tell it nothing. COMPUTES is a program whose own sources, or the templates that they
+# use, have much to compute: pictures, long JSON.
 if(LIVEMAP_DEVELOPMENT)
   find_package(GTest REQUIRED)
 endif()
 # All of them, without what they do not need.
 add_custom_target(livemap_gtests)
 function(livemap_gtest name)
-  cmake_parse_arguments(TEST "" "" "SOURCES;THREADED;DEPENDS" ${ARGN})
+  cmake_parse_arguments(TEST "COMPUTES" "" "SOURCES;THREADED;DEPENDS" ${ARGN})
   if(TEST_THREADED AND LIVEMAP_SANITIZE MATCHES "thread")
     set(TEST_SOURCES)
   endif()
@@ -47,8 +48,8 @@ function(livemap_gtest name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_definitions(${name} PRIVATE LIVEMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(${name} PRIVATE ${TEST_DEPENDS} GTest::gmock GTest::gtest_main livemap_options)
-  if(NOT livemap_simulation IN_LIST TEST_DEPENDS)
-    # Half the time to compile, and hardly more to run, but for those that render pictures.
+  if(NOT TEST_COMPUTES AND NOT livemap_simulation IN_LIST TEST_DEPENDS)
+    # Half the time to compile, and hardly more to run.
     target_compile_options(${name} PRIVATE -O0)
   endif()
   set_target_properties(${name} PROPERTIES LIVEMAP_IS_TEST ON)
