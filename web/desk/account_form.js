@@ -1,7 +1,8 @@
 // The question before an account is added or changed: its name, role or password.
 
 import { byId, element } from '../dom.js';
-import { send, sentenceFor, session } from '../session.js';
+import { sentenceFor, session } from '../session.js';
+import { sendConfirmed } from './own_password.js';
 
 const ROLES = [['viewer', 'Viewer: sees vehicles'],
   ['official', 'Official: also decides'], ['admin', 'Admin: also manages accounts']];
@@ -79,7 +80,7 @@ export class AccountForm {
       if (body.password !== byId('account-again').value) return this.refuse('The two passwords differ.');
     }
     byId('account-submit').disabled = true;
-    const answer = await send('POST', `/api/v1/accounts/${what}`, body);
+    const answer = await sendConfirmed('POST', `/api/v1/accounts/${what}`, body);
     if (answer.status !== 200) return this.refuse(sentenceFor(answer));
     if (what === 'password' && body.name === session.name) {
       // The own session has ended, too.

@@ -4,9 +4,10 @@
 import { byId, element } from '../dom.js';
 import { ago, localTime } from '../format.js';
 import { renew } from '../renew.js';
-import { send, sentenceFor, session } from '../session.js';
+import { sentenceFor, session } from '../session.js';
 import { getJson } from '../zone_lists.js';
 import { AccountForm } from './account_form.js';
+import { sendConfirmed } from './own_password.js';
 
 const MOST = 200;
 const EVENTS = 20;
@@ -134,7 +135,7 @@ export class AccountsView {
   }
 
   async act(call, name, done) {
-    const answer = await send('POST', `/api/v1/accounts/${call}`, { name });
+    const answer = await sendConfirmed('POST', `/api/v1/accounts/${call}`, { name });
     if (answer.status === 200) this.done(`${name}: ${done}`, name);
     else this.error.textContent = sentenceFor(answer);
   }

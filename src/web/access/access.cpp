@@ -49,6 +49,15 @@ std::optional<LogInBody> ParseLogIn(const std::string& body) {
   return LogInBody{*name, *password};
 }
 
+/// None where the body is anything but {"password": TEXT}.
+std::optional<std::string> ParseConfirmation(const std::string& body) {
+  const auto json = nlohmann::json::parse(body, nullptr, false);
+  if (!json.is_object() || json.size() != 1) return std::nullopt;
+  const auto password = json.find("password");
+  if (password == json.end() || !password->is_string()) return std::nullopt;
+  return password->get<std::string>();
+}
+
 /// Sets a flag as long as it lives, where nobody else had.
 class Turn {
  public:
@@ -224,26 +233,70 @@ HttpResponse Access::LogIn(const HttpRequest& question) {
     return MakeErrorAnswer(400,
                            "the body is not accepted, accepted are the texts name and password");
   }
-  // By its hash: a name may be as long as a body.
-  const std::string counted = Sha256Hex(body->name);
-  if (!MayTryPassword(question.client, counted)) {
-    return TooMany("too many passwords were wrong, try again in a minute");
-  }
-  const Turn turn(hashes_);
-  if (!turn.is_mine()) return MakeBusyAnswer("somebody else logs in just now");
-  const auto person = accounts_->CheckPassword(body->name, body->password);
-  if (!person) {
-    CountWrongPassword(question.client, counted);
-    // A name that is none is not written down: it may be a password in the wrong field.
-    const bool is_name = accounts_->Has(body->name);
-    Note(accounts::AccountEventKind::kWrongPassword, is_name ? body->name : "", question);
-    return Unauthorized("the name or the password is wrong");
-  }
+  HttpResponse refusal;
+  const auto person = CheckPassword(question, body->name, body->password, refusal);
+  if (!person) return refusal;
   const std::string token = accounts_->OpenSession(person->name, SystemNs());
+  {
+    const MutexLock lock(mutex_);
+    confirmed_.Confirm(token, SteadyNs());
+  }
   Note(accounts::AccountEventKind::kLogIn, person->name, question);
   HttpResponse answer = JsonAnswer(PersonJson(*person, token));
   answer.headers.emplace_back("Set-Cookie", Cookie(token, options_.session_s));
   return answer;
+}
+
+/// Whose password it is; none, and a refusal, where it is nobody's or is not looked at now.
+std::optional<accounts::Person> Access::CheckPassword(const HttpRequest& question,
+                                                      const std::string& name,
+                                                      const std::string& password,
+                                                      HttpResponse& refusal) {
+  // By its hash: a name may be as long as a body.
+  const std::string counted = Sha256Hex(name);
+  if (!MayTryPassword(question.client, counted)) {
+    refusal = TooMany("too many passwords were wrong, try again in a minute");
+    return std::nullopt;
+  }
+  const Turn turn(hashes_);
+  if (!turn.is_mine()) {
+    refusal = MakeBusyAnswer("another password is looked at just now");
+    return std::nullopt;
+  }
+  const auto person = accounts_->CheckPassword(name, password);
+  if (person) return person;
+  CountWrongPassword(question.client, counted);
+  // A name that is none is not written down: it may be a password in the wrong field.
+  const bool is_name = accounts_->Has(name);
+  Note(accounts::AccountEventKind::kWrongPassword, is_name ? name : "", question);
+  refusal = Unauthorized("the name or the password is wrong");
+  return std::nullopt;
+}
+
+HttpResponse Access::Confirm(const HttpRequest& question) {
+  const auto person = PersonOf(question);
+  if (!person) return Unauthorized("nobody has logged in");
+  const std::string token = SessionToken(question);
+  if (auto forged = WhyForged(question, token)) return *std::move(forged);
+  if (!IsJsonType(question.content_type)) return WrongBodyType();
+  const auto password = ParseConfirmation(question.body);
+  if (!password) {
+    return MakeErrorAnswer(400, "the body is not accepted, accepted is the text password");
+  }
+  HttpResponse refusal;
+  if (!CheckPassword(question, person->name, *password, refusal)) return refusal;
+  const MutexLock lock(mutex_);
+  confirmed_.Confirm(token, SteadyNs());
+  return JsonAnswer({{"name", person->name}, {"confirmed_s", kConfirmedS}});
+}
+
+std::optional<HttpResponse> Access::WhyNotConfirmed(const HttpRequest& question) const {
+  const MutexLock lock(mutex_);
+  if (confirmed_.IsConfirmed(SessionToken(question), SteadyNs())) return std::nullopt;
+  HttpResponse refusal =
+      JsonAnswer({{"error", "enter your own password again"}, {"confirm", true}});
+  refusal.status = 403;
+  return refusal;
 }
 
 HttpResponse Access::LogOut(const HttpRequest& question) {

@@ -9,6 +9,7 @@
 #include "accounts/account_store.h"
 #include "common/mutex.h"
 #include "common/queues/token_bucket.h"
+#include "web/access/confirmed_sessions.h"
 #include "web/access/official_authenticator.h"
 #include "web/http/http_message.h"
 #include "web/http/site.h"
@@ -43,6 +44,9 @@ class Access {
   /// None where the request may do in the name of `admin` what is about the zone itself, else the
   /// refusal: only somebody who has logged in may, no program by a token.
   std::optional<HttpResponse> WhyNotAdmin(const HttpRequest& question, std::string& admin) const;
+  /// None where whoever has logged in has shown the password in the last kConfirmedS seconds, else
+  /// a refusal whose key `confirm` is true.
+  std::optional<HttpResponse> WhyNotConfirmed(const HttpRequest& question) const;
   /// Runs `work`, which hashes a password, and returns its answer. While another password is hashed
   /// it is not run, and the answer is a refusal: each takes 64 MiB.
   HttpResponse HashInTurn(const std::function<HttpResponse()>& work);
@@ -51,6 +55,9 @@ class Access {
 
   /// `POST /api/v1/session` with `{"name", "password"}`: opens a session, whose cookie it sets.
   HttpResponse LogIn(const HttpRequest& question);
+  /// `POST /api/v1/session/confirm` with `{"password"}`: whoever has logged in shows the password
+  /// again, which a log-in has done, too.
+  HttpResponse Confirm(const HttpRequest& question);
   /// `DELETE /api/v1/session`: closes it.
   HttpResponse LogOut(const HttpRequest& question);
   /// `GET /api/v1/session`: who has logged in, and what may be seen.
@@ -60,6 +67,8 @@ class Access {
   /// time the seconds have passed.
   static constexpr int kMaxWrongPasswords = 10;
   static constexpr double kSecondsPerWrongPassword = 60;
+  /// What changes accounts wants a password that was shown so lately, s.
+  static constexpr double kConfirmedS = 300;
 
  private:
   std::string CookieName() const;
@@ -69,6 +78,9 @@ class Access {
   /// Into the trail of log-ins: what the account's owner did, or somebody in its name.
   void Note(accounts::AccountEventKind kind, const std::string& name, const HttpRequest& question);
   bool MayTryPassword(const std::string& client, const std::string& name) const;
+  std::optional<accounts::Person> CheckPassword(const HttpRequest& question,
+                                                const std::string& name,
+                                                const std::string& password, HttpResponse& refusal);
   void CountWrongPassword(const std::string& client, const std::string& name);
   /// Refuses pages of other origins, and forged requests of a session.
   std::optional<HttpResponse> WhyForged(const HttpRequest& question,
@@ -82,6 +94,7 @@ class Access {
   mutable Mutex mutex_;
   /// By client and by account, "c:NAME" and "a:NAME".
   KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
+  ConfirmedSessions confirmed_ GUARDED_BY(mutex_){kConfirmedS};
 };
 
 /// Status 429, to be asked again in a minute.

@@ -77,8 +77,13 @@ HttpResponse AccountApi::Answer(const RequestTarget& target, const HttpRequest& 
     answer = is_read ? Events(target) : AccountMethodNotAllowed("GET, HEAD");
   } else if (const auto action = ActionOf(below)) {
     RefuseQueryParameters(target);
-    answer = question.method == "POST" ? Change(*action, admin, question)
-                                       : AccountMethodNotAllowed("POST");
+    if (question.method != "POST") {
+      answer = AccountMethodNotAllowed("POST");
+    } else if (auto unconfirmed = access_.WhyNotConfirmed(question)) {
+      answer = *std::move(unconfirmed);
+    } else {
+      answer = Change(*action, admin, question);
+    }
   } else {
     answer = MakeErrorAnswer(404, "there is nothing at this address");
   }

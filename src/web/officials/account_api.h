@@ -31,7 +31,8 @@ class AccountApi {
   static bool IsAddress(std::string_view path);
   /// Answers `GET /api/v1/accounts` and `.../events`, and `POST` (ParseAccountBody) to `.../add`,
   /// `.../role`, `.../password`, `.../remove`, `.../lock`, `.../unlock` and `.../end_sessions`,
-  /// which go into the trail. Throws BadRequest.
+  /// which go into the trail and want the admin's own password (Access::WhyNotConfirmed). Throws
+  /// BadRequest.
   HttpResponse Answer(const RequestTarget& target, const HttpRequest& question);
 
  private:

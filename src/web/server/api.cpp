@@ -15,6 +15,7 @@ namespace livemap::web {
 namespace {
 
 constexpr std::string_view kSessionAddress = "/api/v1/session";
+constexpr std::string_view kConfirmAddress = "/api/v1/session/confirm";
 constexpr std::string_view kImagePrefix = "/images/";
 constexpr std::string_view kLeafletPrefix = "/vendor/leaflet/";
 constexpr std::string_view kTilePrefix = "/tiles/";
@@ -189,6 +190,10 @@ HttpResponse Api::AnswerPost(const HttpRequest& question) {
     refusal.headers.emplace_back("Allow", "GET, HEAD, POST, DELETE");
     return refusal;
   }
+  if (target.path == kConfirmAddress) {
+    RefuseQueryParameters(target);
+    return question.method == "POST" ? access_.Confirm(question) : PostOnly();
+  }
   const bool can_be_read = decision && CanBeRead(decision->decision);
   const char* accepted = can_be_read ? "GET, HEAD, POST" : decision ? "POST" : "GET, HEAD";
   HttpResponse answer =
@@ -253,6 +258,7 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return sees.vehicles ? Vehicles() : LogInFirst();
   if (path == kSessionAddress) return access_.Session(question);
+  if (path == kConfirmAddress) return PostOnly();
   if (path == "/api/v1/config") return PageConfig();
   return MakeErrorAnswer(404, "there is nothing at this address");
 }

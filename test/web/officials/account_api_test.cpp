@@ -41,10 +41,19 @@ class AccountApiTest : public testing::Test {
     store.Add("jones", accounts::Role::kViewer, kSamePassword, SystemNs());
     store.Add("miller", accounts::Role::kOfficial, kSamePassword, SystemNs());
     store.Add("root", accounts::Role::kAdmin, kSamePassword, SystemNs());
+    Restart();
+  }
+
+  void Restart() {
     WebConfig options = TestOptions();
-    options.accounts_file = file;
+    options.accounts_file = folder_.path() + "/accounts.sqlite";
     options.token_file = tokens_.path();
+    server_.reset();
     server_ = std::make_unique<WebServer>(options, *fixture_.zone, fixture_.catalogue);
+  }
+  HttpResult Confirm(const std::string& password, const Headers& headers) {
+    return Request(port(), "POST", "/api/v1/session/confirm", headers,
+                   nlohmann::json{{"password", password}}.dump());
   }
 
   int port() const { return server_->port(); }
@@ -95,6 +104,37 @@ TEST_F(AccountApiTest, OnlyAnAdminWhoHasLoggedInSeesAndChangesAccounts) {
   EXPECT_EQ(Do("lock", "jones", forged.ToChange()).status, 403);
   EXPECT_EQ(Do("remove", "jones", forged.ToChange()).status, 403);
   EXPECT_EQ(TryLogIn("jones").status, 200) << "nothing was locked";
+}
+
+TEST_F(AccountApiTest, AChangeWantsTheOwnPasswordAgainWhereItWasNotShownLately) {
+  const LoggedIn admin = LogIn("root");
+  EXPECT_EQ(Do("lock", "jones", admin.ToChange()).status, 200) << "the log-in has shown it";
+  Restart();  // It forgets when.
+  EXPECT_EQ(Get(port(), "/api/v1/accounts", admin.ToRead()).status, 200);
+  for (const char* what : {"unlock", "remove", "end_sessions"}) {
+    const HttpResult refusal = Do(what, "jones", admin.ToChange());
+    EXPECT_EQ(refusal.status, 403) << what;
+    EXPECT_EQ(refusal.Json()["confirm"], true) << refusal.body;
+  }
+  EXPECT_EQ(Confirm("wrong horse battery", admin.ToChange()).status, 401);
+  EXPECT_EQ(Do("unlock", "jones", admin.ToChange()).status, 403);
+  EXPECT_EQ(Confirm(kSamePassword, admin.ToChange()).status, 200);
+  EXPECT_EQ(Do("unlock", "jones", admin.ToChange()).status, 200);
+}
+
+TEST_F(AccountApiTest, APasswordIsConfirmedForOneSessionAndByItsPageAlone) {
+  const LoggedIn admin = LogIn("root");
+  const LoggedIn elsewhere = LogIn("root");
+  Restart();
+  LoggedIn forged = admin;
+  forged.csrf_token[0] = forged.csrf_token[0] == '0' ? '1' : '0';
+  EXPECT_EQ(Confirm(kSamePassword, forged.ToChange()).status, 403);
+  EXPECT_EQ(Confirm(kSamePassword, {{"Content-Type", "application/json"}}).status, 401);
+  EXPECT_EQ(Request(port(), "POST", "/api/v1/session/confirm", admin.ToChange(), "[]").status, 400);
+  EXPECT_EQ(Get(port(), "/api/v1/session/confirm", admin.ToRead()).status, 405);
+  EXPECT_EQ(Confirm(kSamePassword, admin.ToChange()).status, 200);
+  EXPECT_EQ(Do("lock", "jones", elsewhere.ToChange()).status, 403);
+  EXPECT_EQ(Do("lock", "jones", admin.ToChange()).status, 200);
 }
 
 TEST_F(AccountApiTest, ListsWhoHasAnAccountAndHowManySessions) {

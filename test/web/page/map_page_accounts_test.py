@@ -17,6 +17,19 @@ NEW_PASSWORD = "staple battery horse"
 class AccountsPage(ConsolePage):
     """What the tests of accounts share."""
 
+    def open_as(self, name):
+        """As somebody who has just shown the password."""
+        super().open_as(name)
+        status = self.browser.execute_async_script("""
+            const [password, done] = arguments;
+            (async () => {
+              const { csrf_token: token } = await (await fetch('api/v1/session')).json();
+              done((await fetch('api/v1/session/confirm', { method: 'POST',
+                headers: { 'X-CSRF-Token': token, 'Content-Type': 'application/json' },
+                body: JSON.stringify({ password }) })).status);
+            })();""", self.password)
+        self.assertEqual(status, 200)
+
     def open_list(self):
         if self.size[0] < 600 and not self.count("#panel.open"):
             self.open_sheet()
@@ -115,6 +128,30 @@ class Accounts(AccountsPage):
         self.press_in("miller", "lock")
         self.wait(lambda: "locked" not in self.find(self.row("miller")).text.split(), "the lock stays")
         self.assert_quiet()
+
+    def test_the_own_password_is_asked_for_where_it_was_not_shown_lately(self):
+        self.open_as("root")
+        self.open_list()
+        # A zone that has restarted does not know when it was.
+        self.zone.do("stop")
+        self.zone.do("start")
+        self.press_in("jones", "lock")
+        self.wait_for_text("#own-password", "Password of root")
+        self.look("accounts_own_password")
+        self.write("#own-password-input", "wrong horse battery")
+        self.click("#own-password-submit")
+        self.wait_for_text("#own-password-error", "The name or the password is wrong.")
+        self.press(Keys.ESCAPE)
+        self.wait_for_text("#accounts-error", "Enter your own password again.")
+        self.press_in("jones", "lock")
+        self.wait_for("#own-password-input")
+        self.write("#own-password-input", self.password)
+        self.click("#own-password-submit")
+        self.wait_for_account("jones", "locked")
+        self.press_in("jones", "lock")
+        self.wait(lambda: "locked" not in self.find(self.row("jones")).text.split(), "it is asked again at once")
+        self.assertEqual(self.count("#own-password"), 0, "the question stays in the page")
+        self.assert_quiet_but(403, 401)
 
     def test_a_new_password_holds_at_once(self):
         self.open_as("root")
