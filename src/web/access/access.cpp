@@ -263,7 +263,7 @@ std::optional<accounts::Person> Access::CheckPassword(const HttpRequest& questio
     refusal = MakeBusyAnswer("another password is looked at just now");
     return std::nullopt;
   }
-  const auto person = accounts_->CheckPassword(name, password);
+  auto person = accounts_->CheckPassword(name, password);
   if (person) return person;
   CountWrongPassword(question.client, counted);
   // A name that is none is not written down: it may be a password in the wrong field.
