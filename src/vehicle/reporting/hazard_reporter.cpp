@@ -596,11 +596,12 @@ std::vector<protocol::Report> HazardReporter::TakeDue(double steady_s, std::size
 std::optional<protocol::Report> HazardReporter::LoadToSend(const Uuid& uuid) {
   auto report = map_.LoadPending(uuid);
   if (!report) return report;
-  const std::string zone = zones_.Redirect(report->zone, report->position);
+  std::string zone = zones_.Redirect(report->zone, report->position);
+  if (zone.empty()) zone = config_.map.zone;
   if (zone == report->zone) return report;
-  const std::string given = map_.GiveZone(uuid, zone);
-  if (given != report->zone) ++counters_.redirected;
-  report->zone = given;
+  map_.GiveZone(uuid, zone);
+  ++counters_.redirected;
+  report->zone = std::move(zone);
   return report;
 }
 

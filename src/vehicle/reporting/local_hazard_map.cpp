@@ -272,17 +272,15 @@ bool LocalHazardMap::Apply(const protocol::Receipt& receipt) {
   return true;
 }
 
-std::string LocalHazardMap::GiveZone(const Uuid& report, const std::string& zone) {
-  std::string given = ZoneOf(zone);
+void LocalHazardMap::GiveZone(const Uuid& report, const std::string& zone) {
   database_->Transaction([&] {
     for (const char* row : {"pending SET zone=? WHERE uuid=?", "known SET zone=? WHERE id=?"}) {
       database_->Prepare(std::string("UPDATE ") + row)
-          .Bind(1, given)
+          .Bind(1, zone)
           .BindBlob(2, report.bytes.data(), report.bytes.size())
           .Execute();
     }
   });
-  return given;
 }
 
 void LocalHazardMap::ForgetZones(const std::function<bool(const std::string&)>& is_gone) {

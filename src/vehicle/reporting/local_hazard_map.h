@@ -113,9 +113,8 @@ class LocalHazardMap {
   /// at the next sight.
   bool Apply(const protocol::Receipt& receipt);
 
-  /// Gives an unfinished report, with what is known of its hazard, to another zone; an empty id is
-  /// the configured one's. Returns the id.
-  std::string GiveZone(const Uuid& report, const std::string& zone);
+  /// Gives an unfinished report, with what is known of its hazard, to the zone with this id.
+  void GiveZone(const Uuid& report, const std::string& zone);
   /// Forgets what the zones told of which `is_gone` says so, the configured one excepted: nobody
   /// takes their hazards back any more. The vehicle's own unfinished reports stay.
   void ForgetZones(const std::function<bool(const std::string&)>& is_gone);

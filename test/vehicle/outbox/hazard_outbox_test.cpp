@@ -210,6 +210,9 @@ TEST_F(HazardReporterTest, AReportForAZoneThatHasLeftTheDirectoryGoesToTheOneOfI
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(again[0].zone, "north");
   EXPECT_EQ(counters().redirected, 1U);
+  steady_s_ += 3600;
+  EXPECT_EQ(TakeDue().at(0).zone, "north");
+  EXPECT_EQ(counters().redirected, 1U) << "it was given away once";
   protocol::Receipt receipt;
   receipt.report_uuid = again[0].uuid;
   receipt.hazard_uuid.bytes[0] = 9;

@@ -166,12 +166,11 @@ TEST_F(LocalHazardZones, AReportIsGivenToAnotherZoneWithWhatIsKnownOfItsHazard) 
   protocol::Report report = MakeReport(1, kStreet);
   report.zone = "east";
   map_->Add(report);
-  EXPECT_EQ(map_->GiveZone(Id(1), "north"), "north");
+  map_->GiveZone(Id(1), "north");
   Restart();
   EXPECT_EQ(map_->LoadPending(Id(1))->zone, "north");
   EXPECT_EQ(ZonesOfKnown(), (std::map<Uuid, std::string>{{Id(1), "north"}}));
   EXPECT_FALSE(map_->Apply(CommittedBy("east", 1, 9)));
-  EXPECT_EQ(map_->GiveZone(Id(1), ""), "west") << "which is configured";
 }
 
 TEST_F(LocalHazardZones, HazardsOfAZoneThatIsGoneAreForgottenAndOwnReportsStay) {
