@@ -99,7 +99,7 @@ def limits(max_message_bytes):
         "# Limits per message and per client.",
         f"message_size_limit {max_message_bytes}",
         f"max_packet_size {max_message_bytes + PACKET_OVERHEAD_BYTES}",
-        "max_inflight_messages 100",
+        "max_inflight_messages 1000",
         "max_queued_messages 10000",
         "max_queued_bytes 268435456",
         "max_keepalive 300",

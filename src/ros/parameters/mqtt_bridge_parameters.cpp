@@ -221,7 +221,7 @@ void ReadBridgeNames(ParameterReader& parameters, BridgeConfig& config) {
 /// A zone's connection carries the messages of many vehicles and is to be down for longer.
 void SetZoneBridgeDefaults(transport::MqttConfig& mqtt) {
   mqtt.session_expiry_s = 3600;
-  mqtt.max_inflight = 100;
+  mqtt.max_inflight = 1000;
   mqtt.queue_messages = 10000;
 }
 
