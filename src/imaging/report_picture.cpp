@@ -69,21 +69,33 @@ cv::Mat MarkedPicture(const cv::Mat& part, double scale, const PictureMarks* mar
   return image;
 }
 
+/// The picture at the best quality from `best` down to `worst` within the bytes; false: none is.
+bool EncodePictureBetween(const cv::Mat& image, int best, int worst, std::size_t max_bytes,
+                          CroppedPicture& cropped) {
+  // The worst first: most pictures that do not fit are known by one encoding.
+  if (!EncodePictureAt(image, worst, max_bytes, cropped)) return false;
+  for (int quality = best; quality > worst; quality -= kFineQualityStep) {
+    if (EncodePictureAt(image, quality, max_bytes, cropped)) return true;
+  }
+  return EncodePictureAt(image, worst, max_bytes, cropped);
+}
+
 /// The best of the part within the bytes whose scale is not below `min_scale`; false: there is
 /// none.
 bool EncodePictureLegibly(const cv::Mat& part, double min_scale, const CropConfig& config,
                           const PictureMarks* marks, CroppedPicture& cropped) {
-  const int worst = std::min(config.quality, kLegibleQuality);
-  for (double scale = 1;; scale = std::max(min_scale, scale * kScaleStep)) {
+  const int legible = std::min(config.quality, kLegibleQuality);
+  const double wide_scale = std::clamp(1.0 * kMinCropPx / part.cols, min_scale, 1.0);
+  for (double scale = 1;;) {
     const cv::Mat image = MarkedPicture(part, scale, marks, cropped.shown);
     cropped.scale = scale;
-    if (EncodePictureAt(image, worst, config.max_bytes, cropped)) {
-      for (int quality = config.quality; quality > worst; quality -= kFineQualityStep) {
-        if (EncodePictureAt(image, quality, config.max_bytes, cropped)) return true;
-      }
-      return EncodePictureAt(image, worst, config.max_bytes, cropped);
-    }
+    // A picture is made smaller than that only when it does not fit in a coarser quality either.
+    const int worst =
+        scale <= wide_scale && image.cols >= kMinCropPx ? std::min(legible, kWideQuality) : legible;
+    if (EncodePictureBetween(image, config.quality, worst, config.max_bytes, cropped)) return true;
     if (scale <= min_scale) return false;
+    const double smaller = std::max(min_scale, scale * kScaleStep);
+    scale = scale > wide_scale ? std::max(wide_scale, smaller) : smaller;
   }
 }
 

@@ -28,7 +28,7 @@ std::vector<std::uint8_t> EncodeJpeg(const Picture& picture, int quality, std::s
 /// How the part of an image around a hazard becomes a picture.
 struct CropConfig {
   std::size_t max_bytes = 12000;  ///< Of the JPEG.
-  int quality = 80;               ///< 1..100; lowered to kLegibleQuality where the bytes want it.
+  int quality = 80;               ///< 1..100; lowered where the bytes want it.
   /// The picture shows this many times the box's sides around it, at least kMinCropPx; 0: the
   /// whole image.
   double context = 3.0;
@@ -36,10 +36,13 @@ struct CropConfig {
 /// What a legible picture keeps to: the shorter side of the box has at least so many pixels, or as
 /// many as in the original where those are fewer...
 constexpr int kLegibleSidePx = 32;
-/// ...and no lower JPEG quality than this.
+/// ...and no lower JPEG quality than this...
 constexpr int kLegibleQuality = 40;
-/// Width of the part that is shown with all its surroundings, where the image has as much: so much
-/// a person needs to judge by it.
+/// ...or than this, where the picture is kMinCropPx wide: rather a coarser picture than a smaller
+/// one.
+constexpr int kWideQuality = 25;
+/// Width of the part that is shown with all its surroundings, and of its picture, where the image
+/// has as much: so much a person needs to judge by it.
 constexpr int kMinCropPx = 480;
 
 /// A hazard's picture and what of the original image it shows.
@@ -57,7 +60,8 @@ PixelRegion WidestCrop(const Box& box, int width, int height, const CropConfig& 
 
 /// The surroundings of `box`, 3 to 2, within the image, as a JPEG of at most `max_bytes`. What the
 /// bytes do not allow is given up in this order: quality down to kLegibleQuality, pixels down to
-/// kLegibleSidePx of the box, surroundings down to one and a half times the box. A budget that
+/// kMinCropPx of width, quality down to kWideQuality, pixels down to kLegibleSidePx of the box,
+/// surroundings down to one and a half times the box. A budget that
 /// even this exceeds gives a picture that is not legible, or none. Also none where there is no
 /// picture, as for EncodeJpeg. A box that does not meet the image shows the whole of it. The marks
 /// are drawn into the picture alone, once it has its size; null: none are.

@@ -121,7 +121,10 @@ std::string WhyNotLegible(const CroppedPicture& cropped, const Picture& picture,
   if (side * scale < std::min(side, 1.0 * kLegibleSidePx) - 0.5) {
     return "the box has " + std::to_string(side * scale) + " pixels";
   }
-  if (CoarsestLuminance(cropped.jpeg) > 20) return "its quality is below 40";
+  const bool wide = decoded.width >= kMinCropPx;
+  if (CoarsestLuminance(cropped.jpeg) > (wide ? 32 : 20)) {
+    return std::string("its quality is below ") + (wide ? "25" : "40");
+  }
   return "";
 }
 
@@ -186,6 +189,28 @@ TEST(CropPicture, GivesUpPixelsAndSurroundingsBeforeTheBoxIsLost) {
   const CroppedPicture tight = CropPicture(noise, {100, 100, 400, 300}, {7000, 80, 3.0});
   EXPECT_EQ(WhyNotLegible(tight, noise, {100, 100, 400, 300}, 7000), "");
   EXPECT_LT(tight.scale, 1);
+}
+
+TEST(CropPicture, IsRatherCoarserThanNarrowerThan480Pixels) {
+  const Picture road = Road();
+  const CroppedPicture best = CropPicture(road, kPothole, {1'000'000, 80, 3.0});
+  const cv::Mat part = road.bgr(
+      cv::Rect(static_cast<int>(best.shown.x), static_cast<int>(best.shown.y), kMinCropPx, 320));
+  const auto bytes_at = [&part](int quality) {
+    std::vector<std::uint8_t> file;
+    cv::imencode(".jpg", part, file,
+                 {cv::IMWRITE_JPEG_QUALITY, quality, cv::IMWRITE_JPEG_OPTIMIZE, 1});
+    return file.size();
+  };
+  const std::size_t budget = bytes_at(kWideQuality);
+  ASSERT_LT(budget, bytes_at(kLegibleQuality));
+  const CroppedPicture coarse = CropPicture(road, kPothole, {budget, 80, 3.0});
+  EXPECT_EQ(coarse.scale, 1);
+  EXPECT_EQ(coarse.quality, kWideQuality);
+  EXPECT_EQ(WhyNotLegible(coarse, road, kPothole, budget), "");
+  const CroppedPicture narrow = CropPicture(road, kPothole, {budget - 1, 80, 3.0});
+  EXPECT_LT(cv::imdecode(narrow.jpeg, cv::IMREAD_COLOR).cols, kMinCropPx);
+  EXPECT_GE(narrow.quality, kLegibleQuality);
 }
 
 TEST(CropPicture, ABudgetThatLeavesNothingToSeeIsSaidAndKept) {
