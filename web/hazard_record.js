@@ -47,6 +47,7 @@ export function hazardsOf({ columns, rows }, labelOf) {
       state: String(row[at.state]),
       presence: row[at.presence],
       vehicles: row[at.vehicles],
+      firstSeen: 1000 * row[at.first_seen_s],
       updated: 1000 * row[at.updated_s],
       sequence: row[at.sequence],
       street: row[at.street],

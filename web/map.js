@@ -10,6 +10,7 @@ import { byId, nextTask, throttled } from './dom.js';
 import { plural } from './format.js';
 import { Graticule } from './layers/graticule.js';
 import { AccountsView } from './desk/accounts_view.js';
+import { AgeFilter } from './panel/age_filter.js';
 import { AreaFilter } from './desk/area_filter.js';
 import { AssignmentList } from './desk/assignment_list.js';
 import { csvOf, geoJsonOf, saveFile } from './desk/export.js';
@@ -125,6 +126,10 @@ class Page {
     this.filter = new ClassFilter(data, this.catalogue, () => this.showAll());
     this.states = new StateFilter(data, () => this.showAll(),
       config.officials ? (shown) => this.showRejected(shown) : null);
+    this.age = new AgeFilter((age) => {
+      data.showAge(age);
+      this.showAll();
+    });
     this.assignments = new AssignmentList((ids) => {
       data.showOnly(ids);
       this.showAll();

@@ -15,6 +15,7 @@ export class ZoneData {
     /** Ids of the only hazards that are shown, and the corners of the area in which they lie; null: all. */
     this.onlyIds = null;
     this.area = null;
+    this.age = null;
     this.keepsRejected = false;
     this.worker = new Worker(new URL('./worker/zone_worker.js', import.meta.url), { type: 'module' });
     this.worker.addEventListener('message', (event) => this.receive(event.data));
@@ -74,7 +75,7 @@ export class ZoneData {
 
   tellFilter() {
     this.worker.postMessage({ type: 'filter', classes: [...this.hiddenClasses],
-      states: [...this.hiddenStates], onlyIds: this.onlyIds, area: this.area });
+      states: [...this.hiddenStates], onlyIds: this.onlyIds, area: this.area, age: this.age });
   }
 
   showOnly(ids) {
@@ -85,6 +86,12 @@ export class ZoneData {
   /** `corners`: [x, y] in units. */
   showArea(corners) {
     this.area = corners;
+    this.tellFilter();
+  }
+
+  /** `age`: {time, after, before}: the time, 'firstSeen' or 'updated', must lie between; null: any. */
+  showAge(age) {
+    this.age = age;
     this.tellFilter();
   }
 

@@ -1,4 +1,5 @@
-// One unconfirmed hazard after the other, each with its picture, for an official at a keyboard.
+// One unconfirmed hazard after the other, each with its pictures side by side, for an official at a
+// keyboard.
 
 import { byId, element } from '../dom.js';
 import { ago, percent, plural, position } from '../format.js';
@@ -6,9 +7,14 @@ import { hazardOf } from '../hazard_record.js';
 import { decideOn } from '../popups/officials.js';
 import { pictureOf } from '../popups/hazard_popup.js';
 import { session } from '../session.js';
+import { pictureAddress } from '../viewer/picture_address.js';
+import { loadPictures } from '../viewer/hazard_pictures.js';
+import { opensViewer } from '../viewer/picture_viewer.js';
 import { getJson } from '../zone_lists.js';
 
 const MOST = 200;
+/** Pictures beside the hazard's own; the viewer has all. */
+const MOST_OTHERS = 3;
 /** Keys of the buttons, by the letter on them. */
 const KEYS = { c: 'review-confirm', r: 'review-reject', n: 'review-next', u: 'review-undo',
   m: 'review-map' };
@@ -82,6 +88,7 @@ export class ReviewQueue {
     byId('review-place').textContent = hazard === undefined ? ''
       : `${this.at + 1} of ${this.hazards.length}${this.isCut ? ' and more' : ''}`;
     byId('review-picture').replaceChildren(...(hazard === undefined ? [] : [pictureOf(hazard)]));
+    this.showOthers(hazard);
     byId('review-subject').replaceChildren(...(hazard === undefined
       ? [this.hazards.length === 0 ? 'Nothing waits for a decision.' : 'That was the last one.']
       : [element('strong', {}, hazard.label), element('span', {}, `${plural(hazard.sightings, 'report')} of ${
@@ -90,6 +97,21 @@ export class ReviewQueue {
     // The keys are the dialog's: they need the focus within it.
     const button = byId(hazard === undefined ? 'review-close' : 'review-confirm');
     if (document.activeElement !== this.reason) button.focus();
+  }
+
+  /** Pictures of other reports beside it: whether all show the same thing. */
+  async showOthers(hazard) {
+    const others = byId('review-others');
+    others.replaceChildren();
+    if (hazard === undefined) return;
+    const pictures = await loadPictures(hazard).catch(() => []);
+    if (this.current !== hazard) return;
+    const own = pictureAddress(hazard.image);
+    others.replaceChildren(...pictures.filter(({ url }) => url !== null && url !== own)
+      .slice(0, MOST_OTHERS).map(({ url, words, alt }) => opensViewer(element('a', {
+        class: 'review-other', href: url, target: '_blank', rel: 'noopener', title: words,
+      }, element('img', { src: url, alt, width: 180, height: 120 }),
+      element('span', {}, words)), hazard, url)));
   }
 
   say(error) {

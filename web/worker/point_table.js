@@ -41,6 +41,9 @@ export class PointTable {
     this.onlyIds = null;
     /** Only what lies within these corners, [x, y] in units, is shown; null: everything. */
     this.area = null;
+    /** Only records whose `time` lies between `after` and `before`, in ms since 1970, are shown;
+     * null: of every age. */
+    this.age = null;
     this.clear();
   }
 
@@ -143,7 +146,13 @@ export class PointTable {
   isShown(slot) {
     return this.hiddenGroups[this.group[slot]] === 0 && this.hiddenStates[this.state[slot]] === 0
       && (this.onlyIds === null || this.onlyIds.has(this.records[slot].id))
-      && (this.area === null || this.isInArea(slot));
+      && (this.area === null || this.isInArea(slot))
+      && (this.age === null || this.isOfAge(this.records[slot]));
+  }
+
+  isOfAge(record) {
+    const time = record[this.age.time];
+    return time > this.age.after && time < this.age.before;
   }
 
   /** The corners may have been drawn in another world than that of 0 to 1. */

@@ -130,9 +130,10 @@ class Zone {
     this.vehicles.clear();
   }
 
-  filter({ classes, states, onlyIds, area }) {
+  filter({ classes, states, onlyIds, area, age }) {
     this.hazards.onlyIds = onlyIds === null ? null : new Set(onlyIds);
     this.hazards.area = area;
+    this.hazards.age = age;
     this.hazards.hiddenGroups.fill(0);
     this.hazards.hiddenStates.fill(0);
     for (const name of classes) {

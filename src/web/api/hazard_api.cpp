@@ -15,9 +15,9 @@
 namespace livemap::web {
 namespace {
 
-constexpr std::array<const char*, 11> kPointColumns{
-    "id",         "latitude",  "longitude", "class",     "state",   "presence",
-    "confidence", "sightings", "vehicles",  "updated_s", "sequence"};
+constexpr std::array<const char*, 12> kPointColumns{
+    "id",         "latitude",  "longitude", "class",     "state",    "presence",
+    "confidence", "sightings", "vehicles",  "updated_s", "sequence", "first_seen_s"};
 
 /// Further columns where the zone knows its streets.
 constexpr std::array<const char*, 3> kStreetColumns{"street", "near", "direction"};
@@ -35,6 +35,10 @@ void AppendNumber(std::string& text, double number, int digits) {
   while (written.back() == '0') written.remove_suffix(1);
   if (written.back() == '.') written.remove_suffix(1);
   text += written;
+}
+
+void AppendSeconds(std::string& text, std::int64_t time_ns) {
+  AppendNumber(text, static_cast<double>(time_ns / 1'000'000) / 1000.0, 3);
 }
 
 /// One line of the points, in the order of kPointColumns. Written by hand: a list has a hundred
@@ -55,9 +59,9 @@ void AppendPoint(std::string& text, const zone::Hazard& hazard) {
   text += ',';
   AppendNumber(text, static_cast<double>(hazard.confidence), 4);
   text += ',' + std::to_string(hazard.sightings) + ',' + std::to_string(hazard.vehicles) + ',';
-  const std::int64_t updated_ms = hazard.updated_ns / 1'000'000;
-  AppendNumber(text, static_cast<double>(updated_ms) / 1000.0, 3);
-  text += ',' + std::to_string(hazard.sequence);
+  AppendSeconds(text, hazard.updated_ns);
+  text += ',' + std::to_string(hazard.sequence) + ',';
+  AppendSeconds(text, hazard.first_seen_ns);
 }
 
 /// The same of kStreetColumns.

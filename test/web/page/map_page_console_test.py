@@ -330,6 +330,25 @@ class Console(ConsolePage):
         self.assertEqual({row["class"] for row in csv.DictReader(io.StringIO(text))}, {"pothole", "deer"})
         self.assert_quiet()
 
+    def test_hazards_are_filtered_by_age(self):
+        self.zone.report("pothole", LAT, LON)
+        self.zone.do("pass", seconds=2 * 86400)
+        self.zone.report("debris", LAT + 0.002, LON)
+        self.open()
+        self.browser.execute_script("const now = Date.now; Date.now = () => now() + 2 * 86400000;")
+        rows = "return [...document.querySelectorAll('#hazard-list .row-label')].map((one) => one.textContent)"
+        for age, left in (("First seen in the last 24 hours", ["Debris"]), ("Nothing new for 24 hours", ["Pothole"]),
+                          ("First seen more than 7 days ago", []), ("Any age", ["Debris", "Pothole"])):
+            self.browser.execute_script("""
+                const select = document.getElementById('age-filter');
+                select.value = [...select.options].find((one) => one.text === arguments[0]).value;
+                select.dispatchEvent(new Event('change'));""", age)
+            self.wait(lambda left=left: sorted(self.browser.execute_script(rows)) == left,
+                      f"'{age}' does not leave {left}")
+            self.assertEqual(self.count(".pin"), len(left), f"signs on the map with '{age}'")
+        self.picture("age")
+        self.assert_quiet()
+
     def click_map_at(self, x, y):
         for kind in ("mousePressed", "mouseReleased"):
             self.browser.execute_cdp_cmd("Input.dispatchMouseEvent", {

@@ -79,6 +79,34 @@ class LogIn(OfficialsPage):
         self.assertEqual(len(hazards), 3)
         self.assert_quiet()
 
+    def test_the_queue_shows_the_pictures_of_all_reports_side_by_side(self):
+        self.open_accounts()
+        for label in ("first sight", "second sight", "third sight"):
+            self.zone.report("pothole", LAT, LON, label=label)
+        self.zone.report("debris", LAT + 0.002, LON, picture=False)
+        self.open()
+        self.log_in("miller")
+        self.wait_logged_in("miller")
+        self.wait_for("#hazard-list button", 2)
+        self.click("#review-open")
+        for at in ("1 of 2", "2 of 2"):
+            self.wait_for_text("#review-place", at)
+            if "Pothole" not in self.text("#review-subject"):
+                self.assertEqual(self.count("#review-others a"), 0, "pictures of another hazard stay")
+                self.press("n")
+                continue
+            self.wait(lambda: self.browser.execute_script("""
+                const all = [...document.querySelectorAll('#review-picture img, #review-others img')];
+                return all.length === 3 && all.every((one) => one.naturalWidth > 0)
+                  && new Set(all.map((one) => one.src)).size === 3;"""), "not all three pictures are there")
+            main, other = (self.browser.execute_script(
+                "return document.querySelector(arguments[0]).getBoundingClientRect().toJSON()", one)
+                for one in ("#review-picture", "#review-others a"))
+            self.assertGreaterEqual(other["left"], main["right"], "they are not side by side")
+            self.picture("review_side_by_side")
+            self.press("n")
+        self.assert_quiet()
+
     def test_letters_in_the_reason_decide_nothing(self):
         self.open_accounts()
         self.zone.report("pothole", LAT, LON)
