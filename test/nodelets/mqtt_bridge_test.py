@@ -60,6 +60,8 @@ def report(drive_id):
 STANDARD_MESSAGES = "/usr/share/{}/msg"
 # Of HazardReport.msg before it had the fields that are now its last 16 bytes.
 MD5_OF_VERSION_1 = "6c9f383b83ba26551f53b42caa304fa7"
+# Of VehiclePosition.msg before it had its last 4 bytes.
+MD5_OF_POSITIONS_2 = "9146c7869de30f12ed97927d98d9681d"
 
 
 class MqttBridgeTest(unittest.TestCase):
@@ -221,6 +223,14 @@ class MqttBridgeTest(unittest.TestCase):
         self.assertEqual(bytes(received.image.data), bytes(old.image.data))
         self.assertEqual((received.shown_x, received.shown_y, received.shown_width, received.shown_height),
                          (0, 0, 0, 0))
+
+    def test_positions_of_version_2_do_not_say_how_old_the_outbox_is(self):
+        old = VehiclePosition(schema_version=2, drive_id="of version 2", latitude=40, outbox_age=7)
+        self.broker.publish_raw("car-2", "livemap/v1/test/vehicle/car-2/position",
+                                envelope(old, md5=MD5_OF_POSITIONS_2, payload=wire_payload(old)[:-4]))
+        received = eventually(lambda: [m for m in self.zone_peer.received("/vehicle/position")
+                                       if m.drive_id == "of version 2"], "it arrives")[0]
+        self.assertEqual((received.schema_version, received.vehicle_id, received.outbox_age), (2, "car-2", 0))
 
     def test_the_zone_in_a_message_stays_on_the_vehicle_and_comes_from_the_topic(self):
         path = os.path.join(self.broker.directory, "raw")

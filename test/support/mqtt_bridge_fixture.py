@@ -37,7 +37,7 @@ WIRE_MD5 = {
     "livemap/HazardReport": "157e70184e3e48f3be020c650d2f788a",
     "livemap/MapChange": "f0c59a6ee1ac17ed9fe4b38192a4afe1",
     "livemap/ReportReceipt": "3bb0f7c51314b5a5e3dd08cca0268f28",
-    "livemap/VehiclePosition": "9146c7869de30f12ed97927d98d9681d",
+    "livemap/VehiclePosition": "c1b41f81adbf946a004a6ca4f4769454",
 }
 
 

@@ -85,12 +85,13 @@ void VehicleView::TellPosition(const geo::TrackPose& pose, const ros::Time& stam
                    stamp - *position_stamp_ >= ros::Duration(config_.position_period_s);
   if (!due) return;
   position_stamp_ = stamp;
-  const zone::VehicleState vehicle{"",
-                                   config_.reporter.drive_id,
-                                   pose.position,
-                                   pose.course_rad,
-                                   pose.speed_mps,
-                                   ros_io::FromRosTime(stamp)};
+  zone::VehicleState vehicle{"",
+                             config_.reporter.drive_id,
+                             pose.position,
+                             pose.course_rad,
+                             pose.speed_mps,
+                             ros_io::FromRosTime(stamp)};
+  vehicle.outbox_age_s = reporter_.OutboxAgeS(vehicle.stamp_ns);
   const double sigma_m = std::sqrt(pose.covariance_m2.trace() / 2);
   const std::vector<std::string> configured_alone = {""};
   for (const std::string& zone : zones_.empty() ? configured_alone : zones_) {

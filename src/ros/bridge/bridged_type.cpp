@@ -110,8 +110,8 @@ std::pair<const std::string, Factory> BridgedTypeEntry(
           }};
 }
 
-/// A new message type joins the bridge by one line here. The earlier definitions are version 1 of
-/// theirs, which did not say what a picture shows.
+/// A new message type joins the bridge by one line here. Of reports and polls version 1 did not say
+/// what a picture shows, of positions version 2 not how old the outbox is.
 const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
       BridgedTypeEntry<CandidateFrame>("", {"image.data"}),
@@ -123,7 +123,8 @@ const std::map<std::string, Factory>& BridgedTypeRegistry() {
                                      {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
       BridgedTypeEntry<MapChange>("f0c59a6ee1ac17ed9fe4b38192a4afe1"),
       BridgedTypeEntry<ReportReceipt>("3bb0f7c51314b5a5e3dd08cca0268f28"),
-      BridgedTypeEntry<VehiclePosition>("9146c7869de30f12ed97927d98d9681d"),
+      BridgedTypeEntry<VehiclePosition>("c1b41f81adbf946a004a6ca4f4769454", {},
+                                        {{"9146c7869de30f12ed97927d98d9681d", 4}}),
   };
   return kRegistry;
 }

@@ -248,11 +248,13 @@ VehiclePosition ToMessage(const zone::VehicleState& vehicle, double horizontal_s
   message.speed = static_cast<float>(vehicle.speed_mps);
   message.horizontal_sigma = static_cast<float>(horizontal_sigma_m);
   message.map_sequence = map_sequence;
+  message.outbox_age = static_cast<float>(vehicle.outbox_age_s.value_or(0));
   return message;
 }
 
 zone::VehicleState FromMessage(const VehiclePosition& message) {
-  CheckVersion(message, "vehicle position");
+  constexpr std::uint16_t kWithoutOutbox = 2;  // Does not say how old its outbox is.
+  CheckVersion(message, "vehicle position", kWithoutOutbox);
   zone::VehicleState vehicle;
   vehicle.vehicle_id = message.vehicle_id;
   vehicle.drive_id = message.drive_id;
@@ -261,6 +263,9 @@ zone::VehicleState FromMessage(const VehiclePosition& message) {
   vehicle.speed_mps = static_cast<double>(message.speed);
   vehicle.stamp_ns = FromRosTime(message.stamp);
   vehicle.sigma_m = static_cast<double>(message.horizontal_sigma);
+  if (message.schema_version > kWithoutOutbox) {
+    vehicle.outbox_age_s = static_cast<double>(message.outbox_age);
+  }
   return vehicle;
 }
 

@@ -31,6 +31,14 @@ bool ResendSchedule::WasSent(const Uuid& report) const {
   return found != entries_.end() && found->second.was_sent;
 }
 
+std::optional<std::int64_t> ResendSchedule::OldestNs() const {
+  const auto oldest = std::min_element(
+      entries_.begin(), entries_.end(),
+      [](const auto& a, const auto& b) { return a.second.created_ns < b.second.created_ns; });
+  if (oldest == entries_.end()) return std::nullopt;
+  return oldest->second.created_ns;
+}
+
 std::size_t ResendSchedule::Held(double now_s) const {
   return static_cast<std::size_t>(
       std::count_if(entries_.begin(), entries_.end(),

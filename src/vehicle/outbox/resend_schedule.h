@@ -42,6 +42,8 @@ class ResendSchedule {
   bool WasSent(const Uuid& report) const;
 
   std::size_t size() const { return entries_.size(); }
+  /// Of the oldest unfinished report, the time of Add's `created_ns`; none: there is no report.
+  std::optional<std::int64_t> OldestNs() const;
   /// How many wait while the link is not cheap.
   std::size_t Held(double now_s) const;
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/time.h"
 #include "geo/ground_projection.h"
 #include "imaging/report_picture.h"
 #include "placement/depth_ground_contact.h"
@@ -212,6 +214,10 @@ class HazardReporter {
   /// Reports that wait for a cheap link.
   std::size_t HeldReports(double steady_s) const {
     return IsCheap(steady_s) ? 0 : schedule_.Held(steady_s);
+  }
+  /// How long before this image stamp the oldest unfinished report was made, s; 0: there is none.
+  double OutboxAgeS(std::int64_t stamp_ns) const {
+    return std::max(0.0, Seconds(stamp_ns - schedule_.OldestNs().value_or(stamp_ns)));
   }
   /// The store's last complaint; empty while it works.
   const std::string& store_error() const { return store_error_; }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
 
 #include "common/clock.h"
 #include "common/time.h"
@@ -51,12 +54,28 @@ void AddReports(MetricsText& text, const zone::ZoneStatistics& zone) {
   text.Add("outcome", "not_now", static_cast<double>(zone.map_changes.not_now));
 }
 
+/// Three quantiles, the greatest among them, instead of a series for each vehicle.
+void AddOutboxes(MetricsText& text, const std::vector<double>& ages_s) {
+  AddOne(text, "livemap_vehicles_telling_outbox", kGauge,
+         "Vehicles heard in the last minute that say how old their outbox is.",
+         static_cast<double>(ages_s.size()));
+  text.Begin("livemap_vehicle_outbox_age_seconds", kGauge,
+             "Age of a vehicle's oldest report without a receipt, by quantile of these vehicles.");
+  if (ages_s.empty()) return;
+  for (const auto& [name, share] :
+       std::array<std::pair<const char*, double>, 3>{{{"0.5", 0.5}, {"0.95", 0.95}, {"1", 1.0}}}) {
+    const double place = share * static_cast<double>(ages_s.size() - 1);
+    text.Add("quantile", name, ages_s[static_cast<std::size_t>(std::ceil(place))]);
+  }
+}
+
 void AddVehicles(MetricsText& text, const zone::ZoneStatistics& zone) {
   AddOne(text, "livemap_vehicle_positions_total", kCounter, "Positions of vehicles, accepted.",
          static_cast<double>(zone.vehicle_positions));
   text.Begin("livemap_vehicle_positions_refused_total", kCounter,
              "Positions of vehicles that were refused, by reason.");
   AddByKind(text, "reason", zone::RefusalName, zone.positions_refused_by_kind);
+  AddOutboxes(text, zone.outbox_ages_s);
   AddOne(text, "livemap_suspect_vehicles", kGauge, "Vehicles that do not count as witnesses.",
          static_cast<double>(zone.suspect_vehicles));
   AddOne(text, "livemap_polls_total", kCounter, "Questions put to vehicles.",

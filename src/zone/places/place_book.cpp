@@ -16,6 +16,7 @@ namespace {
 constexpr std::int64_t kPositionNs = 500'000'000;
 constexpr double kMaxCourseRad = 4 * M_PI;
 constexpr double kMaxSigmaM = 1e4;
+constexpr double kMaxOutboxAgeS = 10 * 365 * 86400.0;
 
 Refusal Implausible(std::string sentence) { return {RefusalKind::kMalformed, std::move(sentence)}; }
 
@@ -51,6 +52,11 @@ std::optional<Refusal> WhyNoPosition(const VehicleState& vehicle, const PlaceBoo
   if (!(vehicle.sigma_m >= 0 && vehicle.sigma_m <= kMaxSigmaM)) {
     return Implausible("standard deviation " + NumberText(vehicle.sigma_m) +
                        " m is not within 0 to " + NumberText(kMaxSigmaM) + " m");
+  }
+  if (vehicle.outbox_age_s &&
+      !(*vehicle.outbox_age_s >= 0 && *vehicle.outbox_age_s <= kMaxOutboxAgeS)) {
+    return Implausible("outbox age " + NumberText(*vehicle.outbox_age_s) +
+                       " s is not within 0 to " + NumberText(kMaxOutboxAgeS) + " s");
   }
   return std::nullopt;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/time.h"
+
 namespace livemap::zone {
 namespace {
 
@@ -79,6 +81,21 @@ std::vector<VehicleState> VehicleTable::ListAfter(const std::string& id, std::si
     if (now_ns - state.heard_ns <= retention_ns_) result.push_back(state);
   }
   return result;
+}
+
+std::vector<double> VehicleTable::OutboxAges(std::int64_t now_ns, double within_s) const {
+  std::vector<double> ages_s;
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& [id, vehicle] : vehicles_) {
+      if (!vehicle.state.outbox_age_s || Seconds(now_ns - vehicle.state.heard_ns) > within_s) {
+        continue;
+      }
+      ages_s.push_back(*vehicle.state.outbox_age_s);
+    }
+  }
+  std::sort(ages_s.begin(), ages_s.end());
+  return ages_s;
 }
 
 std::vector<TrackPoint> VehicleTable::Track(const std::string& vehicle_id) const {

@@ -31,6 +31,9 @@ class VehicleTable {
   /// The first `limit` of those whose id comes after `id`.
   std::vector<VehicleState> ListAfter(const std::string& id, std::size_t limit,
                                       std::int64_t now_ns) const;
+  /// How old the outboxes are of the vehicles that say so and were heard within `within_s`, s, in
+  /// rising order.
+  std::vector<double> OutboxAges(std::int64_t now_ns, double within_s) const;
   void Forget(const std::string& vehicle_id);
   /// Where the vehicle was during the last two minutes, by when the zone heard it, oldest first, at
   /// most the newest 240 places.

@@ -23,6 +23,8 @@ constexpr std::size_t kShownDecisions = 20;
 constexpr std::size_t kMaxDecisionsForFrame = 1000;
 /// That are deleted for their age in one step.
 constexpr std::size_t kMaxPicturesAtOnce = 100;
+/// Of which vehicles the outboxes count: they tell their places about once a second.
+constexpr double kOutboxAgesS = 60;
 /// Between two pieces: a lock that is taken again at once lets nobody in.
 constexpr std::chrono::milliseconds kPause{2};
 
@@ -743,6 +745,7 @@ ZoneStatistics ZoneService::Statistics() const {
   statistics.map_changes.by_state = state.map_changes.counts();
   statistics.image_bytes = images_.total_bytes();
   statistics.pictures_refused = pictures_.refused();
+  statistics.outbox_ages_s = vehicles_.OutboxAges(now_ns_(), kOutboxAgesS);
   statistics.suspect_vehicles = state.trust.Count(config_.life.suspect_above, now_ns_());
   return statistics;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "zone/admission/report_validation.h"
 #include "zone/model/hazard_state.h"
@@ -38,6 +39,9 @@ struct ZoneStatistics {
   /// Pictures of accepted reports and answers that were not kept, by PictureRefusal.
   std::array<std::uint64_t, kPictureRefusals> pictures_refused{};
   std::size_t suspect_vehicles = 0;  ///< Too often contradicted: they do not count as vehicles.
+  /// Of vehicles that were heard in the last minute and say it: the age of the oldest report that
+  /// waits for a receipt, s, in rising order.
+  std::vector<double> outbox_ages_s;
   MapChangeStatistics map_changes;
   StoreDamage store_damage;  ///< What was found broken in the store at start.
 

@@ -304,7 +304,8 @@ TEST(HazardConversions, VehiclePositionKeepsThatTheCourseIsUnknown) {
   vehicle.course_rad = std::numeric_limits<double>::quiet_NaN();
   vehicle.speed_mps = 0.25;
   vehicle.stamp_ns = kStampNs;
-  const VehiclePosition message = ToMessage(vehicle, 1.5, 42);
+  vehicle.outbox_age_s = 12.5;
+  VehiclePosition message = ToMessage(vehicle, 1.5, 42);
   EXPECT_EQ(message.map_sequence, 42u);
   EXPECT_EQ(message.horizontal_sigma, 1.5F);
   const zone::VehicleState back = FromMessage(message);
@@ -312,6 +313,9 @@ TEST(HazardConversions, VehiclePositionKeepsThatTheCourseIsUnknown) {
   EXPECT_EQ(back.speed_mps, 0.25);
   EXPECT_EQ(back.stamp_ns, kStampNs);
   EXPECT_EQ(back.drive_id, "drive-1");
+  EXPECT_EQ(back.outbox_age_s, 12.5);
+  message.schema_version = 2;
+  EXPECT_EQ(FromMessage(message).outbox_age_s, std::nullopt) << "version 2 does not say it";
 }
 
 TEST(HazardConversions, OtherSchemaVersionsAreRefused) {
@@ -319,8 +323,8 @@ TEST(HazardConversions, OtherSchemaVersionsAreRefused) {
   EXPECT_THAT([] { FromMessage(HazardNotice()); }, ThrowsMessage<Error>(HasSubstr("version 0")));
   EXPECT_THAT([] { FromMessage(ReportReceipt()); }, ThrowsMessage<Error>(HasSubstr("version 0")));
   VehiclePosition newer;
-  newer.schema_version = 3;
-  EXPECT_THAT([&] { FromMessage(newer); }, ThrowsMessage<Error>(HasSubstr("version 3")));
+  newer.schema_version = 4;
+  EXPECT_THAT([&] { FromMessage(newer); }, ThrowsMessage<Error>(HasSubstr("version 4")));
 }
 
 TEST(HazardConversions, UnknownActionsAndStatesAreRefused) {

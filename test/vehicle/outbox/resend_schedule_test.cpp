@@ -103,6 +103,16 @@ TEST(ResendSchedule, WhatWasSentAMomentAgoIsNotSentAtOnceAgainByAnAnswer) {
   EXPECT_THAT(SendUntil(schedule, 8.0, 8.0), ElementsAre(Id(2)));
 }
 
+TEST(ResendSchedule, TheOldestReportIsTheOneThatWasMadeFirst) {
+  ResendSchedule schedule = WithoutJitter();
+  EXPECT_EQ(schedule.OldestNs(), std::nullopt);
+  schedule.Add(Id(1), 3, 20, 0.0);
+  schedule.Add(Id(2), 1, 10, 0.0, 100.0);
+  EXPECT_EQ(schedule.OldestNs(), 10);
+  schedule.Remove(Id(2));
+  EXPECT_EQ(schedule.OldestNs(), 20);
+}
+
 TEST(ResendSchedule, AHeldReportWaitsForACheapLinkOrTheEndOfItsTime) {
   ResendSchedule schedule = WithoutJitter();
   schedule.SetCheapLink(false);

@@ -59,6 +59,26 @@ TEST_F(ZoneMetricsTest, CountsReportsRefusalsAndAges) {
   EXPECT_THAT(metrics, Not(HasSubstr("car-1")));
 }
 
+TEST_F(ZoneMetricsTest, SaysHowOldTheOutboxesAreOfVehiclesThatSayIt) {
+  EXPECT_THAT(Metrics(), Not(HasSubstr("livemap_vehicle_outbox_age_seconds{")));
+  int number = 0;
+  for (const auto& age_s :
+       {std::optional(0.0), std::optional(40.0), std::optional(2.5), std::optional<double>()}) {
+    zone::VehicleState vehicle;
+    vehicle.vehicle_id = "car-" + std::to_string(++number);
+    vehicle.position = {40.44, -79.94};
+    vehicle.stamp_ns = fixture_.now_ns;
+    vehicle.outbox_age_s = age_s;
+    ASSERT_TRUE(fixture_.zone->UpdateVehicle(vehicle));
+  }
+  const std::string metrics = Metrics();
+  EXPECT_THAT(metrics, HasSubstr("livemap_vehicles_telling_outbox 3\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_vehicle_outbox_age_seconds{quantile=\"0.5\"} 2.5\n"));
+  EXPECT_THAT(metrics, HasSubstr("livemap_vehicle_outbox_age_seconds{quantile=\"1\"} 40\n"));
+  fixture_.now_ns += 61'000'000'000;
+  EXPECT_THAT(Metrics(), HasSubstr("livemap_vehicles_telling_outbox 0\n"));
+}
+
 TEST_F(ZoneMetricsTest, EveryLineIsOfTheTextFormatAndEveryFamilyHasOneType) {
   std::istringstream lines(Metrics());
   const std::regex comment("# (HELP|TYPE) (livemap_[a-z_]+) .+");

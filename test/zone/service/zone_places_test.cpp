@@ -145,6 +145,8 @@ TEST_F(ZonePlacesTest, ImpossiblePositionsAreRefusedAndCountedByTheirKind) {
   EXPECT_FALSE(with([](VehicleState& v) { v.sigma_m = kNan; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.sigma_m = -1; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.sigma_m = 1e9; }));
+  EXPECT_FALSE(with([](VehicleState& v) { v.outbox_age_s = kNan; }));
+  EXPECT_FALSE(with([](VehicleState& v) { v.outbox_age_s = -1; }));
   EXPECT_FALSE(with([&](VehicleState& v) { v.course_rad = infinity; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.course_rad = 1e9; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.position = {0, 0}; }));
