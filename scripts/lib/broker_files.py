@@ -91,7 +91,8 @@ def vehicle_rights(zone):
             f"pattern read {vehicle}/receipt",
             f"pattern read {vehicle}/change_receipt",
             f"pattern read {vehicle}/notice",
-            f"pattern read {vehicle}/poll"]
+            f"pattern read {vehicle}/poll",
+            f"pattern read {vehicle}/directory"]
 
 
 def limits(max_message_bytes):

@@ -36,6 +36,7 @@ def rights(zone, revoked):
         f"topic write {prefix}/vehicle/+/change_receipt",
         f"topic write {prefix}/vehicle/+/notice",
         f"topic write {prefix}/vehicle/+/poll",
+        f"topic write {prefix}/vehicle/+/directory",
         f"topic write {prefix}/notice",
         "",
         *denied,

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/clock.h"
@@ -11,9 +12,9 @@
 
 namespace livemap::directory {
 
-/// The zone directory in a file that somebody else writes (DirectoryKeeper, or a person). The file
-/// is read again when it has changed. What is forged, half written, or older than what was read
-/// before takes nothing away from that. Not thread-safe.
+/// The zone directory in a file that others write, too (another DirectoryFile, or a person). The
+/// file is read again when it has changed. What is forged, half written, or older than what was
+/// read before takes nothing away from that. Not thread-safe.
 ///
 /// Typical usage:
 ///
@@ -29,8 +30,15 @@ class DirectoryFile {
   /// Whether there was another file than at the last call, which has been read. A file that is gone
   /// says nothing against what it said.
   bool ReadIfChanged();
+  /// Puts a signed directory into the file if it is newer than what is known, as
+  /// DirectoryKeeper::Offer. It counts at once. The known one again is accepted; it comes back into
+  /// a file that is gone or damaged. Returns why it is refused, in one sentence. Throws Error when
+  /// the file cannot be written.
+  std::optional<std::string> Offer(const std::string& bytes);
   /// The newest directory that was read, while it is not expired; null: none.
   std::shared_ptr<const ZoneDirectory> directory() const;
+  /// That directory as it is signed, also an expired one; empty: none.
+  const std::string& bytes() const;
   /// What was wrong with the file that was read last; empty: nothing.
   const std::string& damage() const { return damage_; }
 

@@ -36,6 +36,8 @@ class DirectoryKeeper {
 
   /// The kept directory while it is not expired; null: none.
   std::shared_ptr<const ZoneDirectory> directory() const;
+  /// The kept directory as it is signed, also an expired one; empty: none.
+  const std::string& bytes() const { return bytes_; }
   /// What was wrong with the file at the start; empty: nothing.
   const std::string& damage() const { return damage_; }
 

@@ -18,7 +18,7 @@ MAX_MESSAGE_BYTES = 1 << 20
 GRANTED_QOS_1 = 1
 # What a vehicle tells the zone on its own topics, and hears from it.
 WRITTEN = ("report", "position", "answer", "change")
-HEARD = ("receipt", "notice", "poll", "change_receipt")
+HEARD = ("receipt", "notice", "poll", "change_receipt", "directory")
 
 
 class NoOneInTest(unittest.TestCase):

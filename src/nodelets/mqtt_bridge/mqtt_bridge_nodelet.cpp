@@ -15,8 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "common/error.h"
 #include "common/mutex.h"
+#include "common/time.h"
 #include "directory/directory_file.h"
+#include "directory/directory_handout.h"
+#include "directory/directory_offers.h"
 #include "directory/zone_handover.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/mqtt_bridge/zone_connections.h"
@@ -34,6 +38,9 @@ namespace {
 constexpr double kZoneTickS = 0.5;
 /// Fixes count when no fused one has come for so long.
 constexpr double kFusedSilenceS = 2;
+constexpr double kHandoutTickS = 0.5;
+/// The payload is the signed file as it is.
+constexpr char kDirectoryTopic[] = "livemap/v1/{zone}/vehicle/{vehicle}/directory";
 
 }  // namespace
 
@@ -43,7 +50,8 @@ constexpr double kFusedSilenceS = 2;
 ///
 /// On a vehicle with a zone directory it connects to the brokers of several zones, as ZoneHandover
 /// decides by the vehicle's position. It writes the zone into each message that comes in, and sends
-/// a message to the zone in it; without one to the present zone.
+/// a message to the zone in it; without one to the present zone. A zone with a zone directory gives
+/// it to each vehicle that it hears; the vehicle puts what is newer into its own file.
 class MqttBridgePart : public NodeletPart {
  public:
   ~MqttBridgePart() override { Close(); }
@@ -65,9 +73,19 @@ class MqttBridgePart : public NodeletPart {
     std::atomic<std::int64_t> next_s_{0};
   };
 
-  struct Topic {
+  struct Counts {
+    explicit Counts(std::string name_of_topic) : name(std::move(name_of_topic)) {}
+    const std::string name;
+    std::atomic<std::uint64_t> carried{0};  ///< Out: accepted by the broker. In: published in ROS.
+    std::atomic<std::uint64_t> bytes{0};    ///< Of the carried messages: MQTT payload and topic.
+    std::atomic<std::uint64_t> refused{0};  ///< By the checks or by the broker.
+    OnceAMinute say_refusal;
+  };
+
+  struct Topic : Counts {
     Topic(const ros_io::BridgeTopic& topic_config)
-        : config(topic_config),
+        : Counts(topic_config.name),
+          config(topic_config),
           mqtt_topic(topic_config.mqtt_topic),
           type(ros_io::MakeBridgedType(topic_config.type,
                                        static_cast<std::size_t>(topic_config.max_bytes))) {}
@@ -76,17 +94,14 @@ class MqttBridgePart : public NodeletPart {
     const std::unique_ptr<ros_io::BridgedType> type;
     ros::Publisher publisher;
     ros::Subscriber subscriber;
-    std::atomic<std::uint64_t> carried{0};  ///< Out: accepted by the broker. In: published in ROS.
-    std::atomic<std::uint64_t> bytes{0};    ///< Of the carried messages: MQTT payload and topic.
-    std::atomic<std::uint64_t> refused{0};  ///< By the checks or by the broker.
     std::atomic<std::uint64_t> dropped{0};  ///< Out: no connection, or the queue was full.
-    OnceAMinute say_refusal;
   };
 
   void Close() {
     // Nothing may call into the clients while they go, nor the clients into the topics.
     diagnostics_.reset();
     zone_timer_.stop();
+    handout_timer_.stop();
     for (ros::Subscriber& subscriber : position_subscribers_) subscriber.shutdown();
     for (const auto& topic : topics_) topic->subscriber.shutdown();
     connections_.reset();
@@ -105,6 +120,7 @@ class MqttBridgePart : public NodeletPart {
     }
     // Publishers stand before a client can call, the clients before subscribers can.
     AdvertiseIncoming();
+    if (IsZone() && !config_.zones.directory.empty()) StartHandout();
     MakeConnections();
     if (FollowsZones()) {
       FollowZones();
@@ -135,6 +151,7 @@ class MqttBridgePart : public NodeletPart {
       if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       subscriptions.push_back({topic->mqtt_topic.SubscriptionFilter(names), topic->config.qos});
     }
+    if (FollowsZones()) subscriptions.push_back({directory_topic_.SubscriptionFilter(names), 1});
     return subscriptions;
   }
 
@@ -149,17 +166,86 @@ class MqttBridgePart : public NodeletPart {
     events.on_connection = [this](const std::string& zone, bool connected,
                                   const std::string& reason) {
       connected ? SayConnection(zone) : SayLoss(zone, reason);
+      // A broker that was killed may have lost what it had for vehicles.
+      if (connected && handout_) handout_->TakeBackAll();
     };
     connections_ = std::make_unique<ZoneConnections>(
         config_.mqtt, [this](const std::string& zone) { return SubscriptionsOf(zone); },
         std::move(events));
   }
 
-  bool FollowsZones() const { return !config_.zones.directory.empty(); }
+  bool FollowsZones() const { return !IsZone() && !config_.zones.directory.empty(); }
   bool IsZone() const { return config_.role == ros_io::BridgeRole::kZone; }
 
   ZoneConnections::Zone ConfiguredZone() const {
     return {config_.zone, {{config_.mqtt.host, config_.mqtt.port}}};
+  }
+
+  /// Starts to give the zone directory to the vehicles that are heard.
+  void StartHandout() {
+    handout_ = std::make_unique<directory::DirectoryHandout>(
+        directory::DirectoryFile(directory::TrustedAuthority::Read(config_.zones.authority),
+                                 config_.zones.directory),
+        config_.handout);
+    ReadHandout();
+    handout_timer_ = getNodeHandle().createSteadyTimer(ros::WallDuration(kHandoutTickS),
+                                                       [this](const ros::SteadyTimerEvent&) {
+                                                         ReadHandout();
+                                                         GiveDirectory();
+                                                       });
+  }
+
+  void ReadHandout() {
+    if (!handout_->ReadIfChanged()) return;
+    const std::string damage = handout_->damage();
+    if (!damage.empty()) NODELET_ERROR("%s", damage.c_str());
+  }
+
+  /// To the vehicles that were heard. While the broker is away they wait: they will be heard again.
+  void GiveDirectory() {
+    transport::MqttClient* const client = connections_ ? ConnectionTo(config_.zone) : nullptr;
+    if (client == nullptr || !client->connected()) return;
+    for (const auto& [vehicle, bytes] : handout_->Next(Nanoseconds(SteadyS()))) {
+      const transport::MqttPublishStatus status =
+          client->Publish(directory_topic_.Expand({config_.zone, vehicle}),
+                          {bytes->begin(), bytes->end()}, 1, topics_.size());
+      if (status != transport::MqttPublishStatus::kQueued) handout_->TakeBack(vehicle);
+    }
+  }
+
+  /// Puts what the zones' brokers have sent since into the vehicle's file.
+  void TakeDirectories() {
+    for (const auto& [zone, bytes] : directory_offers_.Take()) {
+      const auto before = directory_file_->directory();
+      if (const auto reason = OfferDirectory(bytes)) {
+        RefuseDirectory(zone, *reason);
+        continue;
+      }
+      ++directory_counts_.carried;
+      directory_counts_.bytes += bytes.size();
+      const auto after = directory_file_->directory();
+      if (!after || (before && before->version() == after->version())) continue;
+      NODELET_INFO("zone '%s' gave version %s of the zone directory", zone.c_str(),
+                   std::to_string(after->version()).c_str());
+    }
+  }
+
+  /// Why it is not taken: it is refused, or cannot be written.
+  std::optional<std::string> OfferDirectory(const std::string& bytes) {
+    try {
+      return directory_file_->Offer(bytes);
+    } catch (const Error& error) {
+      return error.what();
+    }
+  }
+
+  void RefuseDirectory(const std::string& zone, const std::string& reason) {
+    const std::string sentence = "from zone '" + zone + "': " + reason;
+    {
+      const MutexLock lock(directory_refusal_mutex_);
+      directory_refusal_ = sentence;
+    }
+    Refuse(directory_counts_, sentence);
   }
 
   /// Starts to choose the zones by the vehicle's position.
@@ -177,6 +263,7 @@ class MqttBridgePart : public NodeletPart {
     zone_timer_ = getNodeHandle().createSteadyTimer(ros::WallDuration(kZoneTickS),
                                                     [this](const ros::SteadyTimerEvent&) {
                                                       ReadDirectory();
+                                                      TakeDirectories();
                                                       ConnectToZones();
                                                     });
   }
@@ -339,13 +426,25 @@ class MqttBridgePart : public NodeletPart {
 
   /// From the broker of `zone` to ROS, on its client's thread.
   void Receive(const std::string& zone, const transport::MqttMessage& message) {
+    if (FollowsZones() && ReceiveDirectory(zone, message)) return;
     for (const auto& topic : topics_) {
       if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
       const std::optional<transport::TopicNames> names = topic->mqtt_topic.Match(message.topic);
       if (!names || (topic->mqtt_topic.has_zone() && names->zone != zone)) continue;
+      if (handout_ && topic->mqtt_topic.has_vehicle()) handout_->Hear(names->vehicle);
       return Publish(*topic, zone, *names, message);
     }
     ++unexpected_;
+  }
+
+  /// Whether it is a zone directory. It is looked at later: a signature takes its time.
+  bool ReceiveDirectory(const std::string& zone, const transport::MqttMessage& message) {
+    const std::optional<transport::TopicNames> names = directory_topic_.Match(message.topic);
+    if (!names || names->zone != zone || names->vehicle != config_.user) return false;
+    if (const auto reason = directory_offers_.Put(zone, message.payload)) {
+      RefuseDirectory(zone, *reason);
+    }
+    return true;
   }
 
   void Publish(Topic& topic, const std::string& zone, const transport::TopicNames& names,
@@ -365,17 +464,16 @@ class MqttBridgePart : public NodeletPart {
   }
 
   void CountOutcome(const transport::MqttPublishOutcome& outcome) {
-    Topic& topic = *topics_[outcome.tag];
-    if (!outcome.accepted()) return Refuse(topic, "the broker: " + outcome.reason);
-    ++topic.carried;
-    topic.bytes += outcome.bytes;
+    Counts& counts = outcome.tag < topics_.size() ? *topics_[outcome.tag] : directory_counts_;
+    if (!outcome.accepted()) return Refuse(counts, "the broker: " + outcome.reason);
+    ++counts.carried;
+    counts.bytes += outcome.bytes;
   }
 
-  void Refuse(Topic& topic, const std::string& reason) {
-    ++topic.refused;
-    if (topic.say_refusal.Due()) {
-      NODELET_WARN("refused a message of topic '%s': %s", topic.config.name.c_str(),
-                   reason.c_str());
+  void Refuse(Counts& counts, const std::string& reason) {
+    ++counts.refused;
+    if (counts.say_refusal.Due()) {
+      NODELET_WARN("refused a message of topic '%s': %s", counts.name.c_str(), reason.c_str());
     }
   }
 
@@ -413,11 +511,26 @@ class MqttBridgePart : public NodeletPart {
       status.add(topic->config.name + "_refused", topic->refused.load());
       if (out) status.add(topic->config.name + "_dropped", topic->dropped.load());
     }
+    if (handout_) {
+      status.add("zone_directory_version", handout_->version());
+      DiagnoseDirectory("_out", status);
+    }
     if (!handover_) return;
     status.add("present_zone", present);
     const auto directory = directory_file_->directory();
     status.add("zone_directory_version", directory ? directory->version() : 0);
+    DiagnoseDirectory("_in", status);
+    {
+      const MutexLock lock(directory_refusal_mutex_);
+      status.add("zone_directory_refusal", directory_refusal_);
+    }
     for (const auto& [zone, connection] : zones) DiagnoseZone(zone, connection, status);
+  }
+
+  void DiagnoseDirectory(const std::string& direction, Diagnostics::Status& status) const {
+    status.add(directory_counts_.name + direction, directory_counts_.carried.load());
+    status.add(directory_counts_.name + "_bytes", directory_counts_.bytes.load());
+    status.add(directory_counts_.name + "_refused", directory_counts_.refused.load());
   }
 
   static void DiagnoseZone(const std::string& zone, const transport::MqttStatistics& connection,
@@ -440,7 +553,15 @@ class MqttBridgePart : public NodeletPart {
   Mutex losses_mutex_;
   OnceAMinute say_losses_again_ GUARDED_BY(losses_mutex_);
   std::set<std::string> said_losses_ GUARDED_BY(losses_mutex_);  ///< In this minute.
+  const transport::TopicTemplate directory_topic_{kDirectoryTopic};
+  Counts directory_counts_{"zone_directory"};  ///< Their tag is one beyond the topics.
+  // Of a zone that has a directory; else null.
+  std::unique_ptr<directory::DirectoryHandout> handout_;
+  ros::SteadyTimer handout_timer_;
   // Of a vehicle that changes zones; else null.
+  directory::DirectoryOffers directory_offers_;
+  Mutex directory_refusal_mutex_;
+  std::string directory_refusal_ GUARDED_BY(directory_refusal_mutex_);  ///< The last one.
   std::optional<directory::DirectoryFile> directory_file_;
   std::unique_ptr<directory::ZoneHandover> handover_;
   std::vector<std::string> told_zones_;

@@ -225,15 +225,34 @@ void SetZoneBridgeDefaults(transport::MqttConfig& mqtt) {
   mqtt.queue_messages = 10000;
 }
 
-void ReadZoneHandover(ParameterReader& parameters, BridgeConfig& config) {
+void ReadBridgeZoneDirectory(ParameterReader& parameters, BridgeConfig& config) {
   config.zones.zone = config.zone;
+  ReadZoneDirectory(parameters, config.zones,
+                    "File of the authority's signed zone directory "
+                    "(docs/reference/zone-directory.md). A zone gives it to its vehicles. A "
+                    "vehicle changes zones by it, and a newer one that a zone gives it takes its "
+                    "place; it need not be there at first. Empty: a vehicle stays with `zone`, and "
+                    "a zone gives none. The launch files set it by the argument "
+                    "`zone_directory`.");
+}
+
+void ReadDirectoryHandout(ParameterReader& parameters, BridgeConfig& config) {
+  parameters.Section("Zone directory");
+  ReadBridgeZoneDirectory(parameters, config);
+  parameters.Read("zone_directory_repeat_s", config.handout.repeat_s, {1, 86400},
+                  "A vehicle is given the directory at its first message, at the first one after "
+                  "the directory changed, and again after this time.",
+                  "s");
+}
+
+void ReadZoneHandover(ParameterReader& parameters, BridgeConfig& config) {
   directory::ZoneHandover::Config& handover = config.handover;
   parameters.Section("Changing zones",
                      "With a zone directory a vehicle connects to the zone in which it is "
                      "(docs/explanation/changing-zones.md). `zone`, `host` and `port` then are "
                      "those of the zone until the first position comes, and where no directory "
                      "counts.");
-  ReadZoneDirectory(parameters, config.zones);
+  ReadBridgeZoneDirectory(parameters, config);
   parameters.Read("zone_hysteresis_m", handover.choice.hysteresis_m, {0, 10000},
                   "The vehicle changes to another zone once it lies deeper in that by this.", "m");
   parameters.Read("zone_max_gap_m", handover.choice.max_gap_m, {0, 100000},
@@ -276,7 +295,11 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
                   "s");
   config.mqtt.tls = ReadMqttTlsOptions(parameters);
   ReadMqttConnection(parameters, config.mqtt);
-  if (config.role == BridgeRole::kVehicle) ReadZoneHandover(parameters, config);
+  if (config.role == BridgeRole::kVehicle) {
+    ReadZoneHandover(parameters, config);
+  } else {
+    ReadDirectoryHandout(parameters, config);
+  }
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
   config.mqtt.client_id = config.user;

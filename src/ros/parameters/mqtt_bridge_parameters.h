@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "directory/directory_handout.h"
 #include "directory/zone_handover.h"
 #include "ros/parameters/shared/parameter_reader.h"
 #include "ros/parameters/shared/shared_parameters.h"
@@ -39,9 +40,11 @@ struct BridgeConfig {
   double password_wait_s = 10;  ///< For a broker that writes the file while we start.
   double diagnostics_period_s = 1;
   transport::MqttConfig mqtt;
-  /// Of a vehicle: how it changes zones, where there is a directory. `zones.zone` is `zone`.
+  /// The zone directory, where there is one. `zones.zone` is `zone`.
   ZoneParameters zones;
+  /// Of a vehicle: how it changes zones.
   directory::ZoneHandover::Config handover;
+  directory::DirectoryHandout::Config handout;  ///< Of a zone that has a directory.
   std::vector<BridgeTopic> topics;
 };
 

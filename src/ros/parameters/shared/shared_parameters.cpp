@@ -35,14 +35,12 @@ std::string ReadDriveId(ParameterReader& parameters, std::int64_t now_ns) {
   return drive_id;
 }
 
-void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones) {
-  parameters.Read(
-      "zone_directory", zones.directory,
-      "File of the authority's signed zone directory (docs/reference/zone-directory.md). Empty: "
-      "the vehicle stays with `zone`. vehicle.launch sets it by the argument `zone_directory`.");
+void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones,
+                       const std::string& meaning) {
+  parameters.Read("zone_directory", zones.directory, meaning);
   parameters.Read("zone_authority", zones.authority,
-                  "Certificate of the authority that signs the directory, a PEM file. "
-                  "vehicle.launch sets it by the argument `zone_authority`.");
+                  "Certificate of the authority that signs the directory, a PEM file. The launch "
+                  "files set it by the argument `zone_authority`.");
   if (zones.directory.empty()) return;
   if (zones.authority.empty()) {
     throw Error(
@@ -65,7 +63,10 @@ void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones) {
     throw Error("parameter 'zone' is '" + zones.zone +
                 "', accepted are 1 to 64 characters of A-Z a-z 0-9 . _ -");
   }
-  ReadZoneDirectory(parameters, zones);
+  ReadZoneDirectory(
+      parameters, zones,
+      "File of the authority's signed zone directory (docs/reference/zone-directory.md). Empty: "
+      "the vehicle stays with `zone`. vehicle.launch sets it by the argument `zone_directory`.");
 }
 
 vehicle::ZoneFinder MakeZoneFinder(const ZoneParameters& zones) {

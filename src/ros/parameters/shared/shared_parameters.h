@@ -24,9 +24,10 @@ struct ZoneParameters {
   std::string authority;  ///< File with the certificate of who signed it.
 };
 
-/// `zone_directory` and `zone_authority`, beside `zone` that `zones` has already. Throws Error when
-/// one is missing that another one needs.
-void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones);
+/// `zone_directory`, of which `meaning` says what it is for, and `zone_authority`, beside `zone`
+/// that `zones` has already. Throws Error when one is missing that another one needs.
+void ReadZoneDirectory(ParameterReader& parameters, ZoneParameters& zones,
+                       const std::string& meaning);
 /// The same with `zone`.
 void ReadZoneParameters(ParameterReader& parameters, ZoneParameters& zones);
 
