@@ -22,4 +22,16 @@ bool ZoneLookup::IsGone(const std::string& id) {
   return directory && !directory->FindId(id);
 }
 
+bool ZoneLookup::IsBeyond(const std::string& id, const geo::GeoPoint& point) {
+  file_.ReadIfChanged();
+  const auto directory = file_.directory();
+  const auto own = directory ? directory->FindId(id) : std::nullopt;
+  if (!own) return false;
+  const ZoneArea& area = directory->zones()[*own].area;
+  if (area.IsNear(point, config_.max_beyond_m) && area.DepthM(point) >= -config_.max_beyond_m) {
+    return false;
+  }
+  return directory->Find(point, 0).has_value();
+}
+
 }  // namespace livemap::directory

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -53,6 +54,29 @@ TEST_F(ZoneLookupTest, AZoneIsGoneOnlyByTheWordOfAValidDirectory) {
   EXPECT_TRUE(zones.IsGone("atlantis"));
   now_ns_ += 100'000'000'000'000'000;  // Over three years.
   EXPECT_FALSE(zones.IsGone("atlantis")) << "it has expired";
+}
+
+TEST_F(ZoneLookupTest, APlaceDeepInAnotherZonesAreaIsNoneOfAZonesBusiness) {
+  ZoneLookup zones = Lookup();
+  const geo::GeoPoint border{40.44, -79.94};
+  const auto east_m = [&border](double way_m) {
+    return geo::GeodesicDestination(border, M_PI / 2, way_m);
+  };
+  EXPECT_FALSE(zones.IsBeyond("oakland", east_m(600))) << "there is no directory yet";
+  std::string text = DirectoryText(1);
+  const std::string shadyside =
+      R"({"type": "Feature", "id": "shadyside", "geometry": {"type": "Polygon", "coordinates":)"
+      R"([[[-79.94, 40.43], [-79.92, 40.43], [-79.92, 40.45], [-79.94, 40.45],)"
+      R"([-79.94, 40.43]]]}, "properties": {"brokers": [{"host": "shadyside.example.org"}]}}, )";
+  text.insert(text.find("{\"type\": \"Feature\","), shadyside);
+  Write(authority_.Sign(text), 0);
+  EXPECT_FALSE(zones.IsBeyond("oakland", east_m(-600))) << "its own area";
+  EXPECT_FALSE(zones.IsBeyond("oakland", east_m(490))) << "near the border";
+  EXPECT_TRUE(zones.IsBeyond("oakland", east_m(510)));
+  EXPECT_FALSE(zones.IsBeyond("shadyside", east_m(510)));
+  EXPECT_TRUE(zones.IsBeyond("shadyside", east_m(-510)));
+  EXPECT_FALSE(zones.IsBeyond("oakland", {50, 8})) << "no zone's area";
+  EXPECT_FALSE(zones.IsBeyond("atlantis", east_m(510))) << "whose area nobody knows";
 }
 
 TEST_F(ZoneLookupTest, ReadsTheFileAgainWhenItHasChanged) {

@@ -67,6 +67,7 @@ class DriverAlertPart : public NodeletPart {
                                                 config_.base_frame, max_ahead_s);
       subscribers_.push_back(node.subscribe("localization/odometry", 100, &Self::OnPose, this));
     }
+    announced_.RefuseBeyond(ros_io::MakeZoneFinder(config_.zones).is_beyond);
     ReadMap();
     map_timer_ = node.createSteadyTimer(ros::WallDuration(config_.database_period_s),
                                         &Self::OnMapTimer, this);
@@ -186,6 +187,7 @@ class DriverAlertPart : public NodeletPart {
     status.add("hazards_invalid", counters.invalid_hazards);
     status.add("hazards_refused", counters.refused_full);
     status.add("notices", notices_);
+    status.add("notices_beyond_zone", announced_.beyond_zone());
     status.add("fixes", fixes_used_);
     status.add("fixes_refused", fixes_refused_);
     status.add("positions", positions);

@@ -17,6 +17,7 @@ void ReadAlertSources(ParameterReader& parameters, DriverAlertConfig& config) {
                   "vehicle.launch sets it by the argument `directory`.");
   parameters.Read("database_period_s", config.database_period_s, {0.1, 3600},
                   "Time between two readings of it.", "s");
+  ReadZoneParameters(parameters, config.zones);
   parameters.Read("max_hazards", config.alerts.max_hazards, {1, 1e7},
                   "Number of hazards kept in memory. Beyond it new ones are refused and counted.");
   parameters.Read("place_sigma_m", config.alerts.default_sigma_m, {0.01, 100},

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "ros/parameters/shared/parameter_reader.h"
+#include "ros/parameters/shared/shared_parameters.h"
 #include "vehicle/alerts/driver_alerts.h"
 #include "vehicle/positioning/fix_track.h"
 
@@ -13,7 +14,8 @@ struct DriverAlertConfig {
   std::string catalogue;  ///< Path of the hazard classes; empty: the package's.
   std::string database;   ///< Of hazard_reporting's local map; empty: notices alone count.
   double database_period_s = 10;
-  std::string streets;  ///< Extract of OpenStreetMap; empty: the course alone counts.
+  ZoneParameters zones;  ///< By which is judged what a zone may announce.
+  std::string streets;   ///< Extract of OpenStreetMap; empty: the course alone counts.
   vehicle::DriverAlerts::Config alerts;
   bool use_fused = false;
   double fused_wait_s = 1.0;

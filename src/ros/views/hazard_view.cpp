@@ -142,6 +142,7 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("waiting_frames", reporter.waiting_frames());
   status.add("notices", counters.notices);
   status.add("invalid_notices", counters.invalid_notices);
+  status.add("notices_beyond_zone", reporter.map().beyond_zone());
   status.add("fixes", counters.fixes);
   status.add("invalid_fixes", counters.invalid_fixes);
   status.add("no_fixes", counters.no_fixes);

@@ -82,6 +82,10 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
     if (there_.erase(notice.hazard_uuid) > 0) changes.gone.push_back(notice.hazard_uuid);
     return changes;
   }
+  if (is_beyond_ && is_beyond_(notice.zone, notice.position)) {
+    ++beyond_zone_;
+    return changes;
+  }
   there_[notice.hazard_uuid] = word;
   gone_.erase(notice.hazard_uuid);
   changes.put.push_back({notice.hazard_uuid, notice.class_name, notice.position,

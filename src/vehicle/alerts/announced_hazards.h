@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "common/uuid.h"
@@ -45,9 +47,16 @@ class AnnouncedHazards {
     std::vector<Uuid> gone;
   };
 
+  /// Whether a place is none of a zone's business (ZoneFinder::is_beyond): a notice that something
+  /// is there is left out and counted.
+  void RefuseBeyond(std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond) {
+    is_beyond_ = std::move(is_beyond);
+  }
   Changes Apply(const protocol::Notice& notice);
   Changes Apply(const StoredHazards& stored);
   std::size_t size() const { return there_.size(); }
+  /// Notices that were left out for RefuseBeyond.
+  std::uint64_t beyond_zone() const { return beyond_zone_; }
 
  private:
   /// The newest word about a hazard.
@@ -62,6 +71,8 @@ class AnnouncedHazards {
   std::unordered_map<Uuid, Word> there_;
   std::unordered_map<Uuid, Word> gone_;  // Removed since the start.
   std::map<std::string, std::uint64_t> stored_sequences_;
+  std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
+  std::uint64_t beyond_zone_ = 0;
 };
 
 }  // namespace livemap::vehicle

@@ -184,8 +184,12 @@ class HazardReporter {
   /// The answer to an order: one picture for each cut, or nothing where none may leave the vehicle.
   void AddPictures(std::uint64_t order, std::vector<imaging::CroppedPicture> pictures);
   /// Reports go to the zone in which their hazard lies; those that wait for a zone that exists no
-  /// longer, to the one that has their place now. Hazards of such a zone are forgotten.
-  void SetZones(ZoneFinder zones) { zones_ = std::move(zones); }
+  /// longer, to the one that has their place now. Hazards of such a zone are forgotten, and what a
+  /// zone says lies in another one is refused.
+  void SetZones(ZoneFinder zones) {
+    map_.RefuseBeyond(zones.is_beyond);
+    zones_ = std::move(zones);
+  }
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const protocol::Notice& notice);
   void AddReceipt(const protocol::Receipt& receipt);

@@ -371,11 +371,15 @@ std::size_t LocalHazardMap::Apply(const std::vector<protocol::Notice>& notices) 
   std::vector<Change> changes;
   std::map<std::string, ZoneMemory> zones;  // Those that say something here, as they become.
   std::size_t unusable = 0;
+  std::uint64_t beyond_zone = 0;
   database_->Transaction([&] {
     for (const protocol::Notice& notice : notices) {
       const std::string zone = ZoneOf(notice.zone);
       ZoneMemory* memory = Remember(zone, zones);
-      if (memory == nullptr || !ApplyNotice(notice, zone, *memory, changes)) ++unusable;
+      const NoticeUse use =
+          memory == nullptr ? NoticeUse::kUnusable : ApplyNotice(notice, zone, *memory, changes);
+      if (use != NoticeUse::kTaken) ++unusable;
+      if (use == NoticeUse::kBeyondZone) ++beyond_zone;
     }
     for (const auto& [zone, memory] : zones) {
       if (memory.chain.known() == map_sequence(zone)) continue;
@@ -387,6 +391,7 @@ std::size_t LocalHazardMap::Apply(const std::vector<protocol::Notice>& notices) 
     EvictBeyondLimit(changes);
   });
   Show(changes);
+  beyond_zone_ += beyond_zone;
   for (auto& [zone, memory] : zones) zones_[zone] = std::move(memory);
   return unusable;
 }
@@ -402,14 +407,14 @@ LocalHazardMap::ZoneMemory* LocalHazardMap::Remember(
   return &zones[zone];
 }
 
-/// False: it is unusable.
-bool LocalHazardMap::ApplyNotice(const protocol::Notice& notice, const std::string& zone,
-                                 ZoneMemory& memory, std::vector<Change>& changes) {
-  if (!IsUsableNotice(notice)) return false;
+LocalHazardMap::NoticeUse LocalHazardMap::ApplyNotice(const protocol::Notice& notice,
+                                                      const std::string& zone, ZoneMemory& memory,
+                                                      std::vector<Change>& changes) {
+  if (!IsUsableNotice(notice)) return NoticeUse::kUnusable;
   if (notice.action == protocol::Notice::Action::kCaughtUp) {
     const bool is_complete = CatchUp(notice, zone, memory, changes);
     memory.told.clear();
-    return is_complete;
+    return is_complete ? NoticeUse::kTaken : NoticeUse::kUnusable;
   }
   if (notice.vehicle_id.empty()) {
     memory.chain.Add(notice.previous_sequence, notice.sequence);
@@ -417,12 +422,15 @@ bool LocalHazardMap::ApplyNotice(const protocol::Notice& notice, const std::stri
     memory.told.insert(notice.hazard_uuid);
   }
   // It came, though it counts for nothing: else its zone would tell it again and again.
-  if (IsOfAnotherZone(notice.hazard_uuid, zone)) return false;
-  if (!IsNews(notice, zone)) return true;
+  if (IsOfAnotherZone(notice.hazard_uuid, zone)) return NoticeUse::kUnusable;
+  const bool is_removed = notice.action == protocol::Notice::Action::kRemoved;
+  if (!is_removed && is_beyond_ && is_beyond_(zone, notice.position)) {
+    return NoticeUse::kBeyondZone;
+  }
+  if (!IsNews(notice, zone)) return NoticeUse::kTaken;
   StoreNotice(notice, zone);
-  changes.push_back({notice.hazard_uuid, notice.action != protocol::Notice::Action::kRemoved,
-                     notice.class_name, notice.position});
-  return true;
+  changes.push_back({notice.hazard_uuid, !is_removed, notice.class_name, notice.position});
+  return NoticeUse::kTaken;
 }
 
 /// Takes away what the zone no longer has and closes the gap; false when some of what belongs to

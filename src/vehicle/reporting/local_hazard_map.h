@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/sqlite.h"
@@ -96,10 +97,18 @@ class LocalHazardMap {
   AddResult Add(const protocol::Report& report, std::int64_t hold_until_ns = 0);
 
   /// Takes in what zones announced, in one transaction. Returns how many were unusable (nil id,
-  /// impossible position, overlong class name, a hazard of another zone) and left out. A kCaughtUp
+  /// impossible position, overlong class name, a hazard of another zone or in its area) and left
+  /// out. A kCaughtUp
   /// takes away what its zone no longer has; one that came without all that belongs to it counts as
   /// unusable.
   std::size_t Apply(const std::vector<protocol::Notice>& notices);
+  /// Whether a place is none of a zone's business (ZoneFinder::is_beyond): what the zone says is
+  /// there is left out. What it said before stays until it takes it back.
+  void RefuseBeyond(std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond) {
+    is_beyond_ = std::move(is_beyond);
+  }
+  /// How many notices were left out for that, since the start.
+  std::uint64_t beyond_zone() const { return beyond_zone_; }
   /// Up to which announcement of the zone with this id the vehicle knows all; 0: none. An empty id
   /// is the configured zone's. Survives a restart.
   std::uint64_t map_sequence(const std::string& zone = "") const;
@@ -143,6 +152,9 @@ class LocalHazardMap {
     std::set<Uuid> told;  // To this vehicle alone, since the last kCaughtUp.
   };
 
+  /// What becomes of a notice.
+  enum class NoticeUse { kTaken, kUnusable, kBeyondZone };
+
   /// What a transaction did to `known`, for the filter after its commit.
   struct Change {
     Uuid id;
@@ -158,8 +170,8 @@ class LocalHazardMap {
   void CountPending();
   void InsertKnown(const protocol::Report& report, const std::string& zone);
   ZoneMemory* Remember(const std::string& zone, std::map<std::string, ZoneMemory>& zones) const;
-  bool ApplyNotice(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
-                   std::vector<Change>& changes);
+  NoticeUse ApplyNotice(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
+                        std::vector<Change>& changes);
   bool IsOfAnotherZone(const Uuid& hazard, const std::string& zone) const;
   bool IsNews(const protocol::Notice& notice, const std::string& zone) const;
   void StoreNotice(const protocol::Notice& notice, const std::string& zone);
@@ -178,7 +190,9 @@ class LocalHazardMap {
   InvalidRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
   DuplicateFilter filter_;
-  std::map<std::string, ZoneMemory> zones_;  // By id.
+  std::map<std::string, ZoneMemory> zones_;                                  // By id.
+  std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
+  std::uint64_t beyond_zone_ = 0;
   std::size_t pending_count_ = 0;
   std::size_t pending_bytes_ = 0;
 };

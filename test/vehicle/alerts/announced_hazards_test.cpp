@@ -102,6 +102,22 @@ TEST(AnnouncedHazardsTest, EachZonesWordCountsForItsOwnHazards) {
   EXPECT_EQ(hazards.size(), 1U);
 }
 
+TEST(AnnouncedHazardsTest, WhatAZoneAnnouncesInAnothersAreaIsLeftOutAndCounted) {
+  AnnouncedHazards hazards;
+  hazards.RefuseBeyond(
+      [](const std::string& zone, const geo::GeoPoint&) { return zone == "west"; });
+  protocol::Notice notice = NoticeOf(1, Action::kAdded, 5);
+  notice.zone = "west";
+  EXPECT_TRUE(hazards.Apply(notice).put.empty());
+  EXPECT_EQ(hazards.beyond_zone(), 1U);
+  notice.zone = "east";
+  EXPECT_EQ(hazards.Apply(notice).put.size(), 1U);
+  notice.sequence = 6;
+  notice.action = Action::kRemoved;
+  EXPECT_EQ(hazards.Apply(notice).gone.size(), 1U);
+  EXPECT_EQ(hazards.beyond_zone(), 1U);
+}
+
 TEST(AnnouncedHazardsTest, ReadsTheLocalMapWhileItIsOpen) {
   const test::TemporaryDirectory directory;
   const std::string path = directory.path() + "/hazards.sqlite3";

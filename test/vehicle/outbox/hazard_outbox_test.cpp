@@ -198,9 +198,9 @@ TEST_F(HazardReporterTest, AReportForAZoneThatHasLeftTheDirectoryGoesToTheOneOfI
   config_.map.zone = "west";
   Restart();
   std::string of_place = "east";
-  reporter_->SetZones(
-      {[&](const geo::GeoPoint&) { return of_place; },
-       [&](const std::string& zone) { return zone == "east" && of_place != zone; }});
+  reporter_->SetZones({[&](const geo::GeoPoint&) { return of_place; },
+                       [&](const std::string& zone) { return zone == "east" && of_place != zone; },
+                       {}});
   DriveFixes(0, 4);
   See(3.0, {{"pothole", 0.8F, BoxAt(12, 0)}});
   EXPECT_EQ(TakeDue().at(0).zone, "east");

@@ -128,7 +128,8 @@ TEST_F(MapChangeOutboxTest, AReportForAZoneThatIsGoneGoesToTheOneOfItsPlace) {
   Restart();
   std::string of_place = "east";
   const ZoneFinder zones = {[&](const geo::GeoPoint&) { return of_place; },
-                            [&](const std::string& zone) { return zone != of_place; }};
+                            [&](const std::string& zone) { return zone != of_place; },
+                            {}};
   outbox_->SetZones(zones);
   outbox_->Add(SignGone(1), 0);
   of_place = "north";

@@ -98,6 +98,30 @@ TEST_F(LocalHazardZones, NoZoneMovesOrRemovesAHazardOfAnother) {
   EXPECT_EQ(map_->map_sequence("east"), 71U);
 }
 
+TEST_F(LocalHazardZones, WhatAZoneAnnouncesInAnothersAreaIsLeftOutAndCountedAndHoldsUpNothing) {
+  // East of 1000 m everything is none of west's business.
+  const double border_deg = East(1000).longitude_deg;
+  map_->RefuseBeyond([border_deg](const std::string& zone, const geo::GeoPoint& place) {
+    return zone == "west" && place.longitude_deg > border_deg;
+  });
+  EXPECT_EQ(map_->Apply({OfZone("west", Action::kAdded, 1, 900, 0, 1),
+                         OfZone("west", Action::kAdded, 2, 1100, 1, 2),
+                         OfZone("east", Action::kAdded, 3, 1200, 0, 1),
+                         // Its own hazard, moved over the border.
+                         OfZone("west", Action::kUpdated, 1, 1100, 2, 3)}),
+            2U);
+  EXPECT_EQ(map_->beyond_zone(), 2U);
+  EXPECT_EQ(ZonesOfKnown(), (std::map<Uuid, std::string>{{Id(1), "west"}, {Id(3), "east"}}));
+  EXPECT_TRUE(map_->Find("pothole", East(900))) << "it stays where it was";
+  EXPECT_FALSE(map_->Find("pothole", East(1100)));
+  EXPECT_FALSE(map_->has_gap());
+  EXPECT_EQ(map_->map_sequence("west"), 3U) << "west need not tell it again";
+  // What it takes back is taken back wherever that lies.
+  map_->Apply({OfZone("west", Action::kRemoved, 1, 1100, 3, 4)});
+  EXPECT_EQ(ZonesOfKnown(), (std::map<Uuid, std::string>{{Id(3), "east"}}));
+  EXPECT_EQ(map_->beyond_zone(), 2U);
+}
+
 TEST_F(LocalHazardZones, ATellingOfAllTakesAwayWhatItsOwnZoneNoLongerHas) {
   map_->Apply({OfZone("west", Action::kAdded, 1, 0, 0, 1),
                OfZone("west", Action::kAdded, 2, 100, 1, 2),

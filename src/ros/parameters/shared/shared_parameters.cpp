@@ -76,7 +76,10 @@ vehicle::ZoneFinder MakeZoneFinder(const ZoneParameters& zones) {
   const auto lookup = std::make_shared<directory::ZoneLookup>(
       config, directory::TrustedAuthority::Read(zones.authority));
   return {[lookup](const geo::GeoPoint& place) { return lookup->IdAt(place); },
-          [lookup](const std::string& zone) { return lookup->IsGone(zone); }};
+          [lookup](const std::string& zone) { return lookup->IsGone(zone); },
+          [lookup, configured = zones.zone](const std::string& zone, const geo::GeoPoint& place) {
+            return lookup->IsBeyond(zone.empty() ? configured : zone, place);
+          }};
 }
 
 void ReadFixTrack(ParameterReader& parameters, vehicle::FixTrack::Config& track) {
