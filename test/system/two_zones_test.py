@@ -1,10 +1,12 @@
 #!/usr/bin/python3
-"""A vehicle drives from one zone into the next and back: nothing is lost, nothing is doubled.
+"""A vehicle drives from one zone into the next and back, each zone is killed on the way: nothing is lost, nothing is
+doubled, and the driver is warned of what lies behind the border before the vehicle is there.
 
 Everything is real: three ROS masters, two brokers, two zones with their stores, a signed zone directory, the vehicle's
 nodelets. The test is the vehicle's receiver and detector.
 """
 
+import concurrent.futures
 import contextlib
 import json
 import os
@@ -28,18 +30,18 @@ import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
 from hazard_reporting_fixture import (FOCAL_PX, HEIGHT, OPTICAL, SPEED_MPS, WIDTH, detection, on_street,  # noqa: E402
                                       place)
-from livemap.msg import DetectionArray, HazardNotice, HazardReport, VehicleZones  # noqa: E402
+from livemap.msg import DetectionArray, HazardAlert, HazardNotice, HazardReport, VehicleZones  # noqa: E402
 from mqtt_bridge_fixture import Master, Peer  # noqa: E402
 from node_testing import eventually  # noqa: E402
 
 VEHICLE = "car-1"
-BORDER_M = 480.0  # Along the way; all lengths below are.
+BORDER_M = 280.0  # Along the way; all lengths below are.
 STEP_M = SPEED_MPS / 10
 SEEN_AHEAD_M = 12.0
-IN_WEST_M = (100.0, 300.0)
-BEHIND_THE_BORDER_M = 486.0  # Seen from before it.
-OF_OTHERS_M = 530.0  # East knows it before the vehicle comes.
-SEEN_WHILE_EAST_IS_DEAD_M = (600.0, 680.0)
+IN_WEST_M = (60.0, 130.0)  # West is killed when the vehicle has just seen the first one.
+BEHIND_THE_BORDER_M = 286.0  # Seen from before it.
+OF_OTHERS_M = 305.0  # East knows it before the vehicle comes.
+DEEP_IN_EAST_M = (380.0, 430.0)  # East is killed when the vehicle has just seen the first one.
 SAME_PLACE_M = 3.0
 
 
@@ -117,9 +119,10 @@ class TwoZonesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("two_zones_test")
-        cls.notices, cls.zones, cls.values = [], [], {}
+        cls.notices, cls.zones, cls.values, cls.alerts = [], [], {}, []
         cls.ends = [rospy.Subscriber("/hazard/notice", HazardNotice, cls.notices.append),
                     rospy.Subscriber("/zones", VehicleZones, cls.zones.append),
+                    rospy.Subscriber("/hazard/alert", HazardAlert, cls.keep_alert),
                     rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics)]
         cls.fixes = rospy.Publisher("/fix", NavSatFix, queue_size=100)
         cls.detections = rospy.Publisher("/hazard/detections", DetectionArray, queue_size=100)
@@ -132,11 +135,17 @@ class TwoZonesTest(unittest.TestCase):
         # Also when the start fails.
         for zone in (cls.west, cls.east):
             cls.addClassCleanup(zone.live_map.__exit__)
-        cls.west.start()
-        cls.east.start()
+        with concurrent.futures.ThreadPoolExecutor() as starts:
+            for _ in starts.map(Zone.start, (cls.west, cls.east)):
+                pass
         cls.tell_east_of_the_hazard()
-        cls.start_vehicle(folder / VEHICLE)
         cls.at_m, cls.direction = 0.0, 1
+        cls.start_vehicle(folder / VEHICLE)
+
+    @classmethod
+    def keep_alert(cls, message):
+        """With the place of the vehicle."""
+        cls.alerts.append((message, cls.at_m))
 
     @classmethod
     def keep_diagnostics(cls, message):
@@ -162,7 +171,7 @@ class TwoZonesTest(unittest.TestCase):
                 "vehicle": VEHICLE, "zone": "west", "directory": folder, "detect": "false", "vo": "false",
                 "broker_port": cls.west.live_map.broker_port, "password_file": cls.west.live_map.password_file(VEHICLE),
                 "zone_directory": cls.signed, "zone_authority": cls.authority,
-                "mqtt_bridge": "{zone_near_m: 100.0, zone_linger_s: 20.0}",
+                "mqtt_bridge": "{zone_near_m: 60.0, zone_linger_s: 20.0}",
                 "hazard_reporting": "{privacy: false, settle_wait_s: 0.0, resend_longest_s: 5.0}"}.items()],
             master=os.environ["ROS_MASTER_URI"])
         info = CameraInfo(width=WIDTH, height=HEIGHT, distortion_model="plumb_bob")
@@ -224,29 +233,45 @@ class TwoZonesTest(unittest.TestCase):
             self.assertEqual(len(here), 1, f"{zone.name} at {way_m} m, of {hazards}")
         self.assertEqual(len(hazards), len(expected_m), f"{zone.name}: {hazards}")
 
-    def test_a_drive_across_the_border_and_back_loses_and_doubles_nothing(self):
-        things_m = [*IN_WEST_M, BEHIND_THE_BORDER_M, OF_OTHERS_M, *SEEN_WHILE_EAST_IS_DEAD_M]
-        self.drive(420.0, things_m)
-        # Before the border: both zones talk to the vehicle, which still is in west.
+    def test_a_drive_across_the_border_and_back_loses_and_doubles_nothing_though_either_zone_is_killed(self):
+        things_m = [*IN_WEST_M, BEHIND_THE_BORDER_M, OF_OTHERS_M, *DEEP_IN_EAST_M]
+        self.drive(IN_WEST_M[0] - SEEN_AHEAD_M + 2 * STEP_M, things_m)
+        self.west.kill()
+        self.drive(230.0, things_m)
+        # Before the border: east talks to the vehicle, though the vehicle still is in west, which is dead.
         self.stand_until(lambda: [n for n in self.notices if n.zone == "east" and n.action == HazardNotice.ADDED],
                          "the hazard behind the border is known")
         self.assertEqual(self.zones[-1].zones, ["west", "east"])
         self.assertEqual(self.bridge("present_zone"), "west")
-        self.drive(560.0, things_m)
-        self.stand_until(lambda: self.pending() == "0", "all reports so far are answered")
+        self.assertIn(self.pending(), ("1", "2"), "what was seen since waits for west")
+        self.drive(340.0, things_m)
+        self.assert_warned_before_the_border()
+        self.stand_until(lambda: len(self.east.hazards()) == 2, "east has the hazard that was seen from before the border")
         self.assertEqual(self.bridge("present_zone"), "east")
+        self.assertIn(self.pending(), ("1", "2"), "east does not answer for west")
+        self.west.live_map.launch_zone()
+        self.stand_until(lambda: self.pending() == "0", "west has answered")
+        self.drive(DEEP_IN_EAST_M[0] - SEEN_AHEAD_M + 2 * STEP_M, things_m)
         self.east.kill()
-        self.drive(720.0, things_m)
-        self.stand_until(lambda: self.pending() == "2", "two reports wait for east")
+        self.drive(460.0, things_m)
+        self.stand_until(lambda: self.pending() in ("1", "2"), "what was seen since waits for east")
+        waiting = self.pending()
         # Back into west, and so far that east is no longer near. Just after the turn the course is not sure yet.
-        self.drive(300.0, [thing_m for thing_m in things_m if thing_m < 650.0])
+        self.drive(180.0, [thing_m for thing_m in things_m if thing_m < 400.0])
         self.stand_until(lambda: self.bridge("present_zone") == "west" and self.zones[-1].zones == ["west"],
                          "the vehicle is in west again")
-        self.assertEqual(self.pending(), "2", "west does not answer for east")
+        self.assertEqual(self.pending(), waiting, "west does not answer for east")
         self.east.live_map.launch_zone()
         self.stand_until(lambda: self.pending() == "0", "east has answered")
         self.assert_hazards(self.west, IN_WEST_M)
-        self.assert_hazards(self.east, (BEHIND_THE_BORDER_M, OF_OTHERS_M, *SEEN_WHILE_EAST_IS_DEAD_M))
+        self.assert_hazards(self.east, (BEHIND_THE_BORDER_M, OF_OTHERS_M, *DEEP_IN_EAST_M))
+
+    def assert_warned_before_the_border(self):
+        announced = {bytes(n.hazard_uuid) for n in self.notices if n.zone == "east" and n.action == HazardNotice.ADDED}
+        warned_at_m = [at_m for alert, at_m in self.alerts
+                       if alert.state == HazardAlert.APPROACH and bytes(alert.hazard_uuid) in announced]
+        self.assertTrue(warned_at_m, self.alerts)
+        self.assertLess(warned_at_m[0], BORDER_M, "the driver is warned too late")
 
 
 if __name__ == "__main__":
