@@ -49,8 +49,9 @@ class DriverAlertPart : public NodeletPart {
     if (config_.catalogue.empty()) {
       config_.catalogue = ros::package::getPath("livemap") + "/config/hazards.yaml";
     }
-    alerts_ = std::make_unique<vehicle::DriverAlerts>(
-        config_.alerts, protocol::HazardCatalogue::Load(config_.catalogue), ReadStreets());
+    const auto catalogue = protocol::HazardCatalogue::Load(config_.catalogue);
+    alerts_ = std::make_unique<vehicle::DriverAlerts>(config_.alerts, catalogue, ReadStreets());
+    announced_ = vehicle::AnnouncedHazards(catalogue);
     fixes_ = std::make_unique<vehicle::FixTrack>(config_.fixes);
     ros::NodeHandle& node = getNodeHandle();
     publisher_ = node.advertise<HazardAlert>("hazard/alert", 100);
@@ -188,6 +189,7 @@ class DriverAlertPart : public NodeletPart {
     status.add("hazards_refused", counters.refused_full);
     status.add("notices", notices_);
     status.add("notices_beyond_zone", announced_.beyond_zone());
+    status.add("hazards_of_two_zones", announced_.hidden());
     status.add("fixes", fixes_used_);
     status.add("fixes_refused", fixes_refused_);
     status.add("positions", positions);

@@ -79,7 +79,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   if (notice.action == Action::kRemoved) {
     if (gone_.size() >= kRemovedKept) gone_.clear();
     gone_[notice.hazard_uuid] = word;
-    if (there_.erase(notice.hazard_uuid) > 0) changes.gone.push_back(notice.hazard_uuid);
+    if (there_.erase(notice.hazard_uuid) > 0) duplicates_.Remove(notice.hazard_uuid, changes);
     return changes;
   }
   if (is_beyond_ && is_beyond_(notice.zone, notice.position)) {
@@ -88,8 +88,9 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   }
   there_[notice.hazard_uuid] = word;
   gone_.erase(notice.hazard_uuid);
-  changes.put.push_back({notice.hazard_uuid, notice.class_name, notice.position,
-                         SigmaOf(notice.covariance_m2), std::nullopt});
+  duplicates_.Put({notice.hazard_uuid, notice.class_name, notice.position,
+                   SigmaOf(notice.covariance_m2), std::nullopt},
+                  notice.zone, changes);
   return changes;
 }
 
@@ -115,12 +116,13 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
     gone = is_anew(gone->second.zone) ? gone_.erase(gone) : std::next(gone);
   }
   std::unordered_set<Uuid> in_map;
+  std::vector<Uuid> removed;
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
     const Word word{row.zone, row.sequence};
     if (!is_anew(row.zone) && IsOld(row.hazard.id, word)) continue;
     there_[row.hazard.id] = word;
-    changes.put.push_back(row.hazard);
+    duplicates_.Put(row.hazard, row.zone, changes);
   }
   for (auto there = there_.begin(); there != there_.end();) {
     // What is newer than all that the map has taken in will come into it yet.
@@ -130,10 +132,11 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
     const bool is_taken_in =
         taken_in != stored.sequences.end() && word.sequence <= taken_in->second;
     const bool gone = in_map.count(there->first) == 0 && (is_anew(word.zone) || is_taken_in);
-    if (gone) changes.gone.push_back(there->first);
+    if (gone) removed.push_back(there->first);
     there = gone ? there_.erase(there) : std::next(there);
   }
-  std::sort(changes.gone.begin(), changes.gone.end());
+  std::sort(removed.begin(), removed.end());
+  for (const Uuid& id : removed) duplicates_.Remove(id, changes);
   return changes;
 }
 

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "common/uuid.h"
+#include "protocol/hazard_catalogue.h"
 #include "protocol/notice.h"
+#include "vehicle/alerts/cross_zone_duplicates.h"
 #include "vehicle/alerts/driver_alerts.h"
 
 namespace livemap::vehicle {
@@ -37,15 +39,16 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path);
 
 /// The hazards that zones have announced: by their notices as they come, and by the vehicle's local
 /// map, which knows what came before the start and is told again what was missed. The newer word
-/// of the hazard's zone counts, by its sequence; another zone's word about it does not. Not
-/// thread-safe.
+/// of the hazard's zone counts, by its sequence; another zone's word about it does not. What two
+/// zones announce at one place is there for the driver once (CrossZoneDuplicates). Not thread-safe.
 class AnnouncedHazards {
  public:
   /// What changes for the driver.
-  struct Changes {
-    std::vector<AlertHazard> put;
-    std::vector<Uuid> gone;
-  };
+  using Changes = CrossZoneDuplicates::Changes;
+
+  /// `catalogue` says how near two hazards of a class are one.
+  explicit AnnouncedHazards(protocol::HazardCatalogue catalogue = {})
+      : duplicates_(std::move(catalogue)) {}
 
   /// Whether a place is none of a zone's business (ZoneFinder::is_beyond): a notice that something
   /// is there is left out and counted.
@@ -57,6 +60,8 @@ class AnnouncedHazards {
   std::size_t size() const { return there_.size(); }
   /// Notices that were left out for RefuseBeyond.
   std::uint64_t beyond_zone() const { return beyond_zone_; }
+  /// Of size(), those that the driver is not told of, because another zone announces them, too.
+  std::size_t hidden() const { return duplicates_.hidden(); }
 
  private:
   /// The newest word about a hazard.
@@ -71,6 +76,7 @@ class AnnouncedHazards {
   std::unordered_map<Uuid, Word> there_;
   std::unordered_map<Uuid, Word> gone_;  // Removed since the start.
   std::map<std::string, std::uint64_t> stored_sequences_;
+  CrossZoneDuplicates duplicates_;
   std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
   std::uint64_t beyond_zone_ = 0;
 };

@@ -102,6 +102,24 @@ TEST(AnnouncedHazardsTest, EachZonesWordCountsForItsOwnHazards) {
   EXPECT_EQ(hazards.size(), 1U);
 }
 
+TEST(AnnouncedHazardsTest, WhatTwoZonesAnnounceAtOnePlaceIsThereOnceUntilTheShownOneIsGone) {
+  AnnouncedHazards hazards;
+  protocol::Notice west = NoticeOf(1, Action::kAdded, 500);
+  west.zone = "west";
+  protocol::Notice east = NoticeOf(2, Action::kAdded, 3);
+  east.zone = "east";
+  EXPECT_EQ(hazards.Apply(west).put.size(), 1U);
+  EXPECT_TRUE(hazards.Apply(east).put.empty());
+  EXPECT_EQ(hazards.size(), 2U);
+  EXPECT_EQ(hazards.hidden(), 1U);
+  west.action = Action::kRemoved;
+  west.sequence = 501;
+  const auto changes = hazards.Apply(west);
+  EXPECT_EQ(changes.gone, std::vector<Uuid>{IdOf(1)});
+  ASSERT_EQ(changes.put.size(), 1U);
+  EXPECT_EQ(changes.put[0].id, IdOf(2));
+}
+
 TEST(AnnouncedHazardsTest, WhatAZoneAnnouncesInAnothersAreaIsLeftOutAndCounted) {
   AnnouncedHazards hazards;
   hazards.RefuseBeyond(
