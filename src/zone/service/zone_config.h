@@ -18,13 +18,16 @@
 #include "zone/polling/poll_scheduler.h"
 #include "zone/registry/map_change_registry.h"
 #include "zone/registry/vehicle_track.h"
+#include "zone/store/zone_lease.h"
 
 namespace livemap::zone {
 
 /// Settings of a zone, with the rules of all its parts.
 struct ZoneConfig {
-  std::string directory;              ///< Holds zone.sqlite3 and images/; made when missing.
-  std::string store_url;              ///< Of PostgreSQL, in place of zone.sqlite3 (ZoneStore).
+  std::string directory;  ///< Holds zone.sqlite3 and images/; made when missing.
+  std::string store_url;  ///< Of PostgreSQL, in place of zone.sqlite3 (ZoneStore).
+  /// Under which the store is written, of store_url; null: no other process waits to take over.
+  std::shared_ptr<const ZoneLease> lease;
   double image_cap_bytes = 2e9;       ///< Pictures on disk; the oldest go beyond it.
   double picture_days = 0;            ///< Pictures go so long after they came; 0: never.
   double vehicle_retention_s = 600;   ///< A vehicle not heard of for this long is forgotten.

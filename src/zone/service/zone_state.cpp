@@ -19,7 +19,8 @@ std::mt19937_64 MakeGenerator(std::uint64_t seed, std::uint64_t sequence) {
 
 ZoneState::ZoneState(const ZoneConfig& config, const std::string& directory,
                      std::uint64_t uuid_seed)
-    : store(config.store_url.empty() ? directory + "/zone.sqlite3" : config.store_url),
+    : store(config.store_url.empty() ? directory + "/zone.sqlite3" : config.store_url,
+            config.lease ? config.lease->epoch() : 0),
       survival(config.catalogue, config.survival),
       trust(config.trust),
       sequence(store.LastSequence()),

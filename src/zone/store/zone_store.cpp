@@ -18,6 +18,7 @@
 #include "zone/store/event_log.h"
 #include "zone/store/hazard_table.h"
 #include "zone/store/learned_tables.h"
+#include "zone/store/lease_row.h"
 #include "zone/store/map_change_table.h"
 #include "zone/store/place_table.h"
 #include "zone/store/postgresql_url.h"
@@ -26,6 +27,7 @@
 #include "zone/store/store_connection.h"
 #include "zone/store/store_validation.h"
 #include "zone/store/stored_histories.h"
+#include "zone/store/zone_lease.h"
 #include "zone/store/zone_schema.h"
 
 namespace livemap::zone {
@@ -34,6 +36,10 @@ namespace {
 /// Within one database of PostgreSQL, the lock that the zone holds which writes to it.
 constexpr char kTryLock[] =
     "SELECT CASE WHEN pg_try_advisory_lock(7810761180241193) THEN 1 ELSE 0 END";
+/// Those that write by a lease share it: it keeps zones without one out. A process that stands
+/// still keeps its lock, so that the lease has to tell them from each other.
+constexpr char kTrySharedLock[] =
+    "SELECT CASE WHEN pg_try_advisory_lock_shared(7810761180241193) THEN 1 ELSE 0 END";
 /// The server notices within moments that the process which held the lock has died.
 constexpr std::chrono::seconds kLockPatience{3};
 /// A server that was killed is back within seconds, and then says whether it had committed.
@@ -48,11 +54,13 @@ bool IsOver(std::chrono::steady_clock::time_point end) {
   return std::chrono::steady_clock::now() >= end;
 }
 
-void TakeDatabase(StoreConnection& connection, const std::string& database) {
+void TakeDatabase(StoreConnection& connection, const std::string& database,
+                  std::uint64_t lease_epoch) {
   const auto end = Until(kLockPatience);
+  const char* const try_lock = lease_epoch == 0 ? kTryLock : kTrySharedLock;
   int is_taken = 0;
-  for (connection.session() << kTryLock, soci::into(is_taken); is_taken == 0;
-       connection.session() << kTryLock, soci::into(is_taken)) {
+  for (connection.session() << try_lock, soci::into(is_taken); is_taken == 0;
+       connection.session() << try_lock, soci::into(is_taken)) {
     if (IsOver(end)) {
       throw StoreError("store: database '" + database +
                        "' is in use by another zone, or by a connection of this one that the "
@@ -62,9 +70,25 @@ void TakeDatabase(StoreConnection& connection, const std::string& database) {
   }
 }
 
+/// Runs one of the statements of a transaction that a former holder of the lease must not commit.
+/// Throws LeaseLost.
+void RequireLease(StoreConnection& connection, const char* statement, std::uint64_t lease_epoch) {
+  const auto epoch = static_cast<long long>(lease_epoch);
+  long long found = 0;
+  connection.session() << statement, soci::use(epoch), soci::into(found);
+  if (connection.session().got_data()) return;
+  throw LeaseLost("store: the lease of epoch " + std::to_string(lease_epoch) +
+                  " is lost, another process of the zone has taken it: nothing was written");
+}
+
 /// Brings the database into the state that the tables expect. Throws StoreError.
-StoreConnection& PrepareZoneStore(StoreConnection& connection, const std::string& database) {
-  if (connection.is_postgresql()) TakeDatabase(connection, database);
+StoreConnection& PrepareZoneStore(StoreConnection& connection, const std::string& database,
+                                  std::uint64_t lease_epoch) {
+  if (lease_epoch != 0 && !connection.is_postgresql()) {
+    throw StoreError("store: '" + database + "' is written by a lease, which wants PostgreSQL");
+  }
+  if (connection.is_postgresql()) TakeDatabase(connection, database, lease_epoch);
+  if (lease_epoch != 0) RequireLease(connection, kBecomeWriter, lease_epoch);
   MigrateZoneStore(connection, database);
   return connection;
 }
@@ -93,9 +117,9 @@ class ZoneStore::Implementation {
  public:
   /// The tables over the connection that writes.
   struct Writer {
-    explicit Writer(const std::string& database)
+    Writer(const std::string& database, std::uint64_t lease_epoch)
         : connection(database, StoreConnection::Use::kWrite),
-          hazards(PrepareZoneStore(connection, database)),
+          hazards(PrepareZoneStore(connection, database, lease_epoch)),
           reports(connection),
           events(connection),
           learned(connection),
@@ -119,14 +143,18 @@ class ZoneStore::Implementation {
     ErasureTables erasure;
   };
 
-  explicit Implementation(const std::string& database)
-      : database_(database), writer_(std::make_unique<Writer>(database)), histories_(database) {
+  Implementation(const std::string& database, std::uint64_t lease_epoch)
+      : database_(database),
+        lease_epoch_(lease_epoch),
+        writer_(std::make_unique<Writer>(database, lease_epoch)),
+        histories_(database) {
     if (!writer_->connection.is_postgresql()) return;
     std::random_device seed;
     std::mt19937_64 generator((static_cast<std::uint64_t>(seed()) << 32) | seed());
     token_ = Uuid::Random(generator).ToString();
     soci::session& session = writer_->connection.session();
     soci::transaction transaction(session);
+    if (lease_epoch_ != 0) RequireLease(writer_->connection, kCheckLease, lease_epoch_);
     session << "DELETE FROM livemap_owner";
     session << "INSERT INTO livemap_owner (token, commits) VALUES (:t, 0)", soci::use(token_);
     transaction.commit();
@@ -169,6 +197,8 @@ class ZoneStore::Implementation {
         is_in_transaction_ = false;
         return;
       }
+      // Last of all: from here to the end of the transaction nobody takes the lease.
+      if (lease_epoch_ != 0) RequireLease(connection, kCheckLease, lease_epoch_);
       const long long commits = commits_ + 1;
       connection.session() << "UPDATE livemap_owner SET commits = :c", soci::use(commits);
       is_uncertain_ = true;
@@ -205,7 +235,7 @@ class ZoneStore::Implementation {
     if (writer_ && !writer_->connection.IsLost()) return;
     writer_ = nullptr;
     auto fresh = ExplainStore("connecting again to '" + database_ + "'",
-                              [&] { return std::make_unique<Writer>(database_); });
+                              [&] { return std::make_unique<Writer>(database_, lease_epoch_); });
     const long long commits = CommitsOf(*fresh);
     const bool was_committed = is_uncertain_ && commits == commits_ + 1;
     if (was_committed && !is_awaited_) {
@@ -246,6 +276,9 @@ class ZoneStore::Implementation {
         RequireConnection();
         is_awaited_ = false;
         break;
+      } catch (const LeaseLost&) {
+        is_awaited_ = false;
+        throw;
       } catch (const StoreError&) {
         if (IsOver(end)) {
           is_awaited_ = false;
@@ -260,7 +293,8 @@ class ZoneStore::Implementation {
   }
 
   const std::string database_;
-  std::unique_ptr<Writer> writer_;  ///< Null between two connections.
+  const std::uint64_t lease_epoch_;  ///< 0: the database is this zone's without a lease.
+  std::unique_ptr<Writer> writer_;   ///< Null between two connections.
   StoredHistories histories_;
   bool is_in_transaction_ = false;
   // Of PostgreSQL.
@@ -270,9 +304,9 @@ class ZoneStore::Implementation {
   bool is_awaited_ = false;    ///< Whether somebody waits to hear of that one.
 };
 
-ZoneStore::ZoneStore(const std::string& database) {
+ZoneStore::ZoneStore(const std::string& database, std::uint64_t lease_epoch) {
   try {
-    implementation_ = std::make_unique<Implementation>(database);
+    implementation_ = std::make_unique<Implementation>(database, lease_epoch);
   } catch (const soci::soci_error& error) {
     const std::string words = OneLine(error.get_error_message());
     const bool damaged = words.find("malformed") != std::string::npos ||

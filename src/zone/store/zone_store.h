@@ -60,7 +60,10 @@ class ZoneStore {
   /// made when missing, or what a `postgresql://` URL names (CheckedPostgresqlUrl). Refuses files
   /// that are damaged, no database at all, or of a newer schema than this program knows, and a
   /// PostgreSQL database that another store has open.
-  explicit ZoneStore(const std::string& database);
+  /// `lease_epoch`: of the ZoneLease under which it is written, in PostgreSQL alone; 0: none. Once
+  /// another process has the lease, the constructor, and Commit for good, throw LeaseLost, and
+  /// nothing of the transaction is there.
+  explicit ZoneStore(const std::string& database, std::uint64_t lease_epoch = 0);
   ~ZoneStore();
   ZoneStore(const ZoneStore&) = delete;
   ZoneStore& operator=(const ZoneStore&) = delete;
