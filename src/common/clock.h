@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <ctime>
 
 namespace livemap {
 
@@ -12,7 +13,15 @@ inline std::int64_t SteadyNs() {
       .count();
 }
 
-/// The moment of that clock `seconds` from now, at which a wait ends.
+/// Nanoseconds of a clock that never goes back and also counts while the machine is suspended; from
+/// an unknown start, for spans only.
+inline std::int64_t BootNs() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
+}
+
+/// The moment of the steady clock `seconds` from now, at which a wait ends.
 inline std::chrono::steady_clock::time_point SteadyDeadline(double seconds) {
   return std::chrono::steady_clock::now() + std::chrono::ceil<std::chrono::steady_clock::duration>(
                                                 std::chrono::duration<double>(seconds));

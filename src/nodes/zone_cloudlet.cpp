@@ -4,10 +4,12 @@
 #include <ros/ros.h>
 
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "nodes/json_log.h"
+#include "nodes/zone_failover.h"
 #include "nodes/zone_node.h"
 
 namespace {
@@ -41,7 +43,16 @@ int main(int argc, char** argv) {
     auto config =
         livemap::ros_io::ReadZoneCloudletConfig(parameters, ros::package::getPath("livemap"));
     if (config.json_log) livemap::nodes::LogAsJson("zone_cloudlet");
-    livemap::nodes::ZoneNode zone(node, private_node, std::move(config));
+    // Before anything waits for the lease: a standby has the streets in memory already.
+    config = livemap::nodes::WithStreets(std::move(config));
+    std::optional<livemap::nodes::ZoneFailover> failover;
+    if (config.lease_s > 0) {
+      failover.emplace(node, private_node, config);
+      if (!failover->AwaitLease()) return 0;
+      config.zone.lease = failover->lease();
+    }
+    livemap::nodes::ZoneNode zone(node, private_node, config);
+    if (failover) failover->SayActive();
     ros::spin();
   } catch (const std::exception& error) {
     livemap::nodes::LogTheEnd("zone_cloudlet", error.what());

@@ -28,7 +28,16 @@ constexpr std::chrono::milliseconds kTellPause{50};
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
 
-/// With the streets of its file, where it names one. Throws Error for a file that is refused.
+zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
+  zone::ZoneInbox::Config limits;
+  limits.max_reports = static_cast<std::size_t>(config.queue_reports);
+  limits.max_bytes = static_cast<std::size_t>(config.queue_bytes);
+  limits.batch = static_cast<std::size_t>(config.batch_reports);
+  return limits;
+}
+
+}  // namespace
+
 ros_io::ZoneCloudletConfig WithStreets(ros_io::ZoneCloudletConfig config) {
   if (config.streets.empty()) return config;
   const std::int64_t begin_ns = SteadyNs();
@@ -49,19 +58,9 @@ ros_io::ZoneCloudletConfig WithStreets(ros_io::ZoneCloudletConfig config) {
   return config;
 }
 
-zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
-  zone::ZoneInbox::Config limits;
-  limits.max_reports = static_cast<std::size_t>(config.queue_reports);
-  limits.max_bytes = static_cast<std::size_t>(config.queue_bytes);
-  limits.batch = static_cast<std::size_t>(config.batch_reports);
-  return limits;
-}
-
-}  // namespace
-
 ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
                    ros_io::ZoneCloudletConfig config)
-    : config_(WithStreets(std::move(config))),
+    : config_(std::move(config)),
       // Never simulated time: a store outlives any replay.
       zone_(config_.zone, SystemNs, EntropySeededGenerator()()),
       inbox_(InboxLimits(config_)),
@@ -173,6 +172,7 @@ void ZoneNode::Count(const Change& change) {
 }
 
 void ZoneNode::OnReport(const HazardReportConstPtr& message) {
+  if (!zone_.IsActive()) return;
   Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.reports_received; });
   protocol::Report report;
   try {
@@ -198,6 +198,7 @@ void ZoneNode::OnReport(const HazardReportConstPtr& message) {
 }
 
 void ZoneNode::OnPosition(const VehiclePosition& message) {
+  if (!zone_.IsActive()) return;
   try {
     const zone::VehicleState vehicle = ros_io::FromMessage(message);
     if (zone_.UpdateVehicle(vehicle)) RecordNewReports(vehicle, message.map_sequence);
@@ -208,6 +209,7 @@ void ZoneNode::OnPosition(const VehiclePosition& message) {
 }
 
 void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
+  if (!zone_.IsActive()) return;
   try {
     if (inbox_.Push(ros_io::FromMessage(message))) return;
     Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.answers_dropped; });
@@ -253,6 +255,11 @@ void ZoneNode::WorkUntilClosed() {
     zone::ZoneInbox::Batch batch = inbox_.Take(telling ? kTellPause : kPatience);
     // Closed before the inbox was found empty: nothing can have come since.
     if (closing && batch.empty()) return;
+    // What came before the lease was lost is another process's to answer.
+    if (!zone_.IsActive()) {
+      telling = false;
+      continue;
+    }
     telling = TellVehicles(std::move(batch.orders));
     HandleAnswers(batch.answers);
     LetTimePass();
@@ -404,6 +411,10 @@ void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     counters.web_pictures_refused = web.pictures.refused;
     counters.web_pictures_last_refusal = web.pictures.last_refusal;
     counters.web_pictures_busy = web.pictures.busy;
+  }
+  if (const zone::ZoneLease* lease = zone_.lease()) {
+    counters.lease = ros_io::ZoneCloudletCounters::Lease{lease->IsHeld(), lease->config().holder,
+                                                         lease->epoch(), lease->AgeS()};
   }
   ros_io::DescribeZone(counters, zone_.Statistics(), status);
 }

@@ -33,6 +33,9 @@
 
 namespace livemap::nodes {
 
+/// With the streets of its file, where it names one. Throws Error for a file that is refused.
+ros_io::ZoneCloudletConfig WithStreets(ros_io::ZoneCloudletConfig config);
+
 /// The zone cloudlet as a ROS node. The callbacks' thread takes positions and puts reports, map
 /// changes, poll answers and orders to tell single vehicles what they missed into the worker's
 /// inbox, which wakes it. The worker thread commits what waits in groups, answers with receipts,
@@ -40,7 +43,8 @@ namespace livemap::nodes {
 /// announced, and the threads of OrderDesk send work orders.
 class ZoneNode {
  public:
-  /// Opens the store, starts the web server and subscribes. Throws Error with one sentence.
+  /// Opens the store, starts the web server and subscribes. `config` has its streets already
+  /// (WithStreets). Throws Error with one sentence.
   ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
            ros_io::ZoneCloudletConfig config);
   /// Commits what is queued and stops.

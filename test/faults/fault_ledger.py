@@ -84,6 +84,9 @@ def count_entered(path):
 
 
 def read_map(path):
+    """Of a file of SQLite, or of what reads a server's database itself."""
+    if not isinstance(path, (str, pathlib.Path)):
+        return path.read()
     database = open_for_reading(path)
     try:
         database.execute("BEGIN")

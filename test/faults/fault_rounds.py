@@ -4,11 +4,20 @@ import os
 import random
 import time
 
-from fault_kinds import KINDS
-from fault_world import VEHICLES, WorldError, wait_until
+import failover_kinds
+from failover_world import FailoverWorld
+from fault_kinds import KINDS as ONE_ZONE_KINDS
+from fault_world import VEHICLES, World, WorldError, wait_until
 
 # A report that waits longer than this after the fault is over counts as stuck. Pauses between two sendings grow to 30 s.
 BOUND_S = 120
+
+KINDS = ONE_ZONE_KINDS | failover_kinds.KINDS
+
+
+def world_of(kind):
+    """The class of the world that the fault strikes."""
+    return FailoverWorld if kind in failover_kinds.KINDS else World
 
 
 def run_round(world, kind, seed, number):
@@ -53,7 +62,8 @@ def settle(ledger, outage):
 
 
 def is_clean(record):
-    return not any(record.get(what) for what in ("lost", "doubled", "unknown", "stuck", "failed"))
+    return not any(record.get(what) for what in ("lost", "doubled", "unknown", "stuck", "failed", "late", "event_numbers_wrong",
+                                             "wrote_late"))
 
 
 def run_rounds(world, kind, seed, numbers):

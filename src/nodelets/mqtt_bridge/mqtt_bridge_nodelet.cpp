@@ -1,5 +1,6 @@
 #include <livemap/VehicleZones.h>
 #include <sensor_msgs/NavSatFix.h>
+#include <std_msgs/Bool.h>
 
 #include <algorithm>
 #include <atomic>
@@ -15,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "common/mutex.h"
 #include "common/time.h"
@@ -36,6 +38,8 @@ namespace livemap::nodelets {
 namespace {
 
 constexpr double kZoneTickS = 0.5;
+/// Between two looks whether the zone's process is still the active one.
+constexpr double kActiveTickS = 0.1;
 /// Fixes count when no fused one has come for so long.
 constexpr double kFusedSilenceS = 2;
 constexpr double kHandoutTickS = 0.5;
@@ -52,6 +56,9 @@ constexpr char kDirectoryTopic[] = "livemap/v1/{zone}/vehicle/{vehicle}/director
 /// decides by the vehicle's position. It writes the zone into each message that comes in, and sends
 /// a message to the zone in it; without one to the present zone. A zone with a zone directory gives
 /// it to each vehicle that it hears; the vehicle puts what is newer into its own file.
+///
+/// Of a zone with a standby only the bridge beside the active process is connected: the broker
+/// keeps one session of the zone's login, with what waits in it, for whichever of the two connects.
 class MqttBridgePart : public NodeletPart {
  public:
   ~MqttBridgePart() override { Close(); }
@@ -102,6 +109,7 @@ class MqttBridgePart : public NodeletPart {
     diagnostics_.reset();
     zone_timer_.stop();
     handout_timer_.stop();
+    active_subscriber_.shutdown();
     for (ros::Subscriber& subscriber : position_subscribers_) subscriber.shutdown();
     for (const auto& topic : topics_) topic->subscriber.shutdown();
     connections_.reset();
@@ -124,6 +132,8 @@ class MqttBridgePart : public NodeletPart {
     MakeConnections();
     if (FollowsZones()) {
       FollowZones();
+    } else if (config_.active_timeout_s > 0) {
+      FollowActivity();
     } else {
       connections_->Keep({ConfiguredZone()});
     }
@@ -246,6 +256,37 @@ class MqttBridgePart : public NodeletPart {
       directory_refusal_ = sentence;
     }
     Refuse(directory_counts_, sentence);
+  }
+
+  /// Connects while the process beside it is the active one of the zone.
+  void FollowActivity() {
+    active_subscriber_ =
+        getNodeHandle().subscribe("zone/active", 1, &MqttBridgePart::OnActivity, this);
+    zone_timer_ = getNodeHandle().createSteadyTimer(
+        ros::WallDuration(kActiveTickS),
+        [this](const ros::SteadyTimerEvent&) { ConnectWhileActive(); });
+  }
+
+  void OnActivity(const std_msgs::Bool& message) {
+    active_ns_ = message.data != 0 ? BootNs() : 0;
+    ConnectWhileActive();
+  }
+
+  void ConnectWhileActive() {
+    const bool is_active = IsActive();
+    if (is_active != was_active_) {
+      NODELET_INFO("%s", is_active ? "the zone is active here: connecting"
+                                   : "the zone is not active here: not connected");
+    }
+    was_active_ = is_active;
+    connections_->Keep(is_active ? std::vector{ConfiguredZone()}
+                                 : std::vector<ZoneConnections::Zone>{});
+  }
+
+  bool IsActive() const {
+    if (config_.active_timeout_s <= 0) return true;
+    return active_ns_ != 0 &&
+           static_cast<double>(BootNs() - active_ns_) < config_.active_timeout_s * 1e9;
   }
 
   /// Starts to choose the zones by the vehicle's position.
@@ -394,6 +435,11 @@ class MqttBridgePart : public NodeletPart {
     if (topic.mqtt_topic.has_vehicle() && !transport::IsValidId(vehicle)) {
       return Refuse(topic, "the addressee '" + vehicle + "' is no vehicle id");
     }
+    // Also of a process that stood still together with the timer.
+    if (!IsActive()) {
+      ++topic.dropped;
+      return;
+    }
     const std::string zone = AddresseeOf(message);
     transport::MqttClient* const client = ConnectionTo(zone);
     // A report that is dropped here is sent again by its owner until the zone's receipt comes.
@@ -483,7 +529,9 @@ class MqttBridgePart : public NodeletPart {
     const auto found = zones.find(present);
     const transport::MqttStatistics mqtt =
         found != zones.end() ? found->second : transport::MqttStatistics();
-    if (!mqtt.connected) {
+    if (!IsActive()) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "standby, not connected");
+    } else if (!mqtt.connected) {
       status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
                      mqtt.last_error.empty() ? "connecting" : mqtt.last_error);
     } else if (mqtt.subscriptions_refused > 0) {
@@ -566,6 +614,10 @@ class MqttBridgePart : public NodeletPart {
   std::unique_ptr<directory::ZoneHandover> handover_;
   std::vector<std::string> told_zones_;
   std::optional<double> fused_s_;  ///< When the last fused fix came.
+  // Of a zone with a standby.
+  ros::Subscriber active_subscriber_;
+  std::int64_t active_ns_ = 0;  ///< BootNs of the last word that the zone is active; 0: it is not.
+  bool was_active_ = false;
   ros::Publisher zones_publisher_;
   std::vector<ros::Subscriber> position_subscribers_;
   ros::SteadyTimer zone_timer_;

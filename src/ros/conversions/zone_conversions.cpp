@@ -166,6 +166,8 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   using diagnostic_msgs::DiagnosticStatus;
   if (!counters.store_error.empty()) {
     status.summary(DiagnosticStatus::ERROR, counters.store_error);
+  } else if (counters.lease && !counters.lease->is_held) {
+    status.summary(DiagnosticStatus::ERROR, "the zone's lease was not renewed in time");
   } else if (statistics.store_damage.rows > 0) {
     status.summary(DiagnosticStatus::WARN, "the store holds rows of impossible values");
   } else if (statistics.active_hazards == 0) {
@@ -233,6 +235,11 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   status.add("web_pictures_last_refusal", counters.web_pictures_last_refusal);
   status.add("web_pictures_busy", counters.web_pictures_busy);
   DescribeZoneMapChanges(counters, statistics.map_changes, status);
+  if (!counters.lease) return;
+  status.add("zone_active", counters.lease->is_held);
+  status.add("lease_holder", counters.lease->holder);
+  status.add("lease_epoch", counters.lease->epoch);
+  status.add("lease_age_s", counters.lease->age_s);
 }
 
 }  // namespace livemap::ros_io

@@ -71,7 +71,15 @@ struct ZoneCloudletCounters {
   std::uint64_t web_failed_handshakes = 0;  ///< Connections that began TLS in vain.
   std::optional<double> web_certificate_s;  ///< Until it ends; none: plain HTTP is spoken.
   std::string web_certificate_refusal;      ///< Of the pair in the files; empty: it is served.
-  std::string store_error;                  ///< Of the newest batch; empty when it went well.
+  /// Under which the zone writes, where a standby waits.
+  struct Lease {
+    bool is_held = false;
+    std::string holder;
+    std::uint64_t epoch = 0;
+    double age_s = 0;  ///< Since it was renewed.
+  };
+  std::optional<Lease> lease;
+  std::string store_error;  ///< Of the newest batch; empty when it went well.
 };
 
 /// Every counter under its own name; an error while the store fails.

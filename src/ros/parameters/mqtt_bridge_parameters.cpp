@@ -299,6 +299,12 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
     ReadZoneHandover(parameters, config);
   } else {
     ReadDirectoryHandout(parameters, config);
+    parameters.Read("active_timeout_s", config.active_timeout_s, {0, 600},
+                    "The bridge is connected only while zone_cloudlet has said on zone/active, "
+                    "less than this time ago, that it is the zone's active process "
+                    "(docs/how-to/run-a-standby.md). 0: it is always connected. zone.launch sets "
+                    "it by the argument `lease_s`.",
+                    "s");
   }
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);

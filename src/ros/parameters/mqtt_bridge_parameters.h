@@ -38,6 +38,7 @@ struct BridgeConfig {
   std::string user;             ///< Required: the vehicle's id, or the zone's login.
   std::string password_file;    ///< Its first line is the password; empty: no password.
   double password_wait_s = 10;  ///< For a broker that writes the file while we start.
+  double active_timeout_s = 0;  ///< Of a zone: without a word of its activity; 0: always active.
   double diagnostics_period_s = 1;
   transport::MqttConfig mqtt;
   /// The zone directory, where there is one. `zones.zone` is `zone`.

@@ -417,6 +417,37 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   if (config.map_datum) web.centre = *config.map_datum;
 }
 
+/// After the store and the work orders.
+void ReadZoneLease(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  parameters.Section("Failover",
+                     "Two processes of one zone, of which one is active and the other its standby: "
+                     "docs/how-to/run-a-standby.md.");
+  parameters.Read("lease_s", config.lease_s, {0, 600},
+                  "Time for which the lease in the database is valid after it was renewed: a "
+                  "standby takes over so long after the last renewal. 0: no lease, this process "
+                  "is the only one of the zone. zone.launch sets it by the argument `lease_s`.",
+                  "s");
+  parameters.Read("lease_renew_s", config.lease_renew_s, {0.05, 60},
+                  "Time between two renewals of the lease. At most half of lease_s.", "s");
+  if (config.lease_s == 0) return;
+  if (config.lease_renew_s > config.lease_s / 2) {
+    throw Error("parameter 'lease_renew_s' is " + std::to_string(config.lease_renew_s) +
+                " s, accepted is at most half of lease_s, which is " +
+                std::to_string(config.lease_s) + " s");
+  }
+  if (config.zone.store_url.empty()) {
+    throw Error(
+        "parameter 'lease_s' is set and 'store_url' is empty, accepted is a lease where the store "
+        "is in PostgreSQL");
+  }
+  // What was sent is kept in the folder of one machine: the other one would send it again.
+  if (!config.work_orders.empty()) {
+    throw Error("parameter 'work_orders' is '" + config.work_orders +
+                "' and 'lease_s' is set, accepted is one of them: a standby does not know which "
+                "orders were sent");
+  }
+}
+
 }  // namespace
 
 ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
@@ -453,6 +484,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   ReadZonePolls(parameters, config.zone);
   ReadZoneStreets(parameters, config);
   ReadZoneOrders(parameters, config);
+  ReadZoneLease(parameters, config);
   ReadZoneMarkers(parameters, config);
   ReadZoneWeb(parameters, package_path, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.

@@ -17,6 +17,8 @@ struct ZoneCloudletConfig {
   std::string streets;      ///< Extract of OpenStreetMap; empty: the zone knows no streets.
   std::string work_orders;  ///< File of recipients and rules; empty: the zone has no work orders.
   zone::ZoneService::Config zone;
+  double lease_s = 0;  ///< Of the lease that the active process holds; 0: there is no standby.
+  double lease_renew_s = 1;                ///< Between two renewals; at most half of lease_s.
   int batch_reports = 500;                 ///< Most reports of one commit.
   int queue_reports = 20000;               ///< Waiting for a commit; beyond it they are not taken.
   double queue_bytes = 256e6;              ///< The same in bytes of pictures.

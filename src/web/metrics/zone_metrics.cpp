@@ -137,6 +137,15 @@ void AddServer(MetricsText& text, const ServerMetrics& server) {
   text.Add(server.answers);
 }
 
+void AddLease(MetricsText& text, const LeaseMetrics& lease) {
+  AddOne(text, "livemap_zone_active", kGauge, "1 where the process is the active one, else 0.",
+         lease.is_active ? 1 : 0);
+  AddOne(text, "livemap_lease_epoch", kGauge, "Number of the lease; it rises with every holder.",
+         static_cast<double>(lease.epoch));
+  AddOne(text, "livemap_lease_age_seconds", kGauge,
+         "Time since the process renewed its lease; 0: it has none.", lease.age_s);
+}
+
 void AddOrders(MetricsText& text, const orders::OrderDesk& desk) {
   const orders::OrderCounts counts = desk.Counts();
   text.Begin("livemap_work_orders", kGauge, "Work orders, by state.");
@@ -155,6 +164,12 @@ void AddOrders(MetricsText& text, const orders::OrderDesk& desk) {
 
 }  // namespace
 
+std::string StandbyMetricsText(const LeaseMetrics& lease) {
+  MetricsText text;
+  AddLease(text, lease);
+  return text.text();
+}
+
 std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& server,
                             const orders::OrderDesk* orders) {
   const zone::ZoneStatistics statistics = zone.Statistics();
@@ -164,6 +179,9 @@ std::string ZoneMetricsText(const zone::ZoneService& zone, const ServerMetrics& 
   AddMap(text, zone, statistics);
   AddStore(text, zone, statistics);
   AddServer(text, server);
+  if (const zone::ZoneLease* lease = zone.lease()) {
+    AddLease(text, {lease->IsHeld(), lease->epoch(), lease->AgeS()});
+  }
   if (orders != nullptr) AddOrders(text, *orders);
   return text.text();
 }

@@ -22,6 +22,16 @@ struct ServerMetrics {
   DurationHistogram::Counts answers;  ///< Time from a request to its answer, without pictures.
 };
 
+/// Whether a process is the active one of its zone, where another one waits to take over.
+struct LeaseMetrics {
+  bool is_active = false;
+  std::uint64_t epoch = 0;  ///< Of the lease as this process knows it.
+  double age_s = 0;         ///< Since the process took or renewed it; 0: it is another's.
+};
+
+/// The metrics of a standby: those of the lease alone, as a zone with a lease has them, too.
+std::string StandbyMetricsText(const LeaseMetrics& lease);
+
 /// All metrics of the zone, with those of its work orders where it has some (`orders` is not null)
 /// (docs/reference/metrics.md), in the text format of Prometheus. No metric names a vehicle or a
 /// place.

@@ -268,6 +268,10 @@ class ZoneService {
   ZoneStatistics Statistics() const;
   /// Whether the store kept the newest transaction; true before the first one.
   bool IsStoreWell() const { return store_well_; }
+  /// Under which the zone writes; null: no other process waits to take over.
+  const ZoneLease* lease() const { return config_.lease.get(); }
+  /// Whether this process may speak for the zone: false while its lease may be another's.
+  bool IsActive() const { return !config_.lease || config_.lease->IsHeld(); }
   /// How long the transactions of reports took.
   DurationHistogram::Counts commit_times() const { return commit_times_.counts(); }
   /// Of committed reports, from their image's stamp to the commit. Not of drives that are played

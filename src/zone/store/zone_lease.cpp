@@ -2,9 +2,9 @@
 
 #include <soci/soci.h>
 
-#include <ctime>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
 #include "zone/store/lease_row.h"
 #include "zone/store/postgresql_url.h"
@@ -19,13 +19,6 @@ constexpr std::size_t kMaxLeaseHolderBytes = 200;
 constexpr char kLockLeaseTable[] = "SELECT count(*) FROM pg_advisory_xact_lock(7810761180241194)";
 /// Somebody may have just the row: it is asked for again.
 constexpr char kLeaseLockTimeout[] = "SET lock_timeout = '500ms'";
-
-/// Unlike the steady clock this one goes on while the machine is suspended.
-std::int64_t BootNs() {
-  timespec now{};
-  clock_gettime(CLOCK_BOOTTIME, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
 
 ZoneLease::Config CheckedLease(ZoneLease::Config config) {
   if (!IsPostgresqlUrl(config.database)) {
