@@ -105,8 +105,8 @@ void AddStore(MetricsText& text, const zone::ZoneService& service,
          static_cast<double>(zone.store_errors));
   AddOne(text, "livemap_store_damaged_rows", kGauge, "Rows found broken at the start.",
          static_cast<double>(zone.store_damage.rows));
-  AddOne(text, "livemap_ready", kGauge, "1 while the store keeps what is written, else 0.",
-         service.IsStoreWell() ? 1 : 0);
+  AddOne(text, "livemap_ready", kGauge, "1 while the zone keeps what it is told, else 0.",
+         service.IsStoreWell() && service.IsActive() ? 1 : 0);
   text.Begin("livemap_commit_seconds", "histogram", "Time that batches of reports take.");
   text.Add(service.commit_times());
   text.Begin("livemap_report_age_seconds", "histogram",
