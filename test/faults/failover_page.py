@@ -15,11 +15,11 @@ HEAD = """# Failover: how soon the map is back
 
 Machine: {machine}.
 
-The set-up is that of [the other faults](faults.md), but the zone is two launches of `zone.launch` on
-two ROS masters: an active one and its standby. They share one server of PostgreSQL and one broker.
-The lease is {lease} s long and renewed every second. Vehicles report all the time. In half of the
-rounds the fault strikes `zone_cloudlet` alone, in the other half its bridge too. Then the page
-counts
+The set-up is that of [the other faults](faults.md), but the zone is two launches of `zone.launch`
+on two ROS masters: an active one and its standby. They share one server of PostgreSQL and one
+broker. The lease is {lease} s long and renewed every {renew} s. Vehicles report all the time. In
+half of the rounds the fault strikes `zone_cloudlet` alone, in the other half its bridge too. Then
+the page counts
 
 - **lost**, **doubled**, **unknown** and **stuck** as [there](faults.md), by the outboxes and the
   rows of the database;
@@ -73,7 +73,8 @@ def notes(records_of):
 
 def page(records_of, seed, _bound_s):
     """`records_of`: kind to its rounds' records, none empty."""
-    head = HEAD.format(machine=fault_page.machine(), lease=failover_world.LEASE_S, bound=failover_kinds.MAP_BACK_BOUND_S)
+    head = HEAD.format(machine=fault_page.machine(), lease=failover_world.LEASE_S, renew=failover_world.RENEW_S,
+                       bound=failover_kinds.MAP_BACK_BOUND_S)
     rows = [row(kind, records_of[kind]) for kind in failover_kinds.KINDS if kind in records_of]
     cells = "\n".join(f"| {' | '.join(line)} |" for line in [COLUMNS, ["---"] * len(COLUMNS), *rows]) + "\n"
     return head + cells + "\n" + notes(records_of) + f"\nSeed {seed}.\n"

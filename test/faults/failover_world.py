@@ -25,7 +25,7 @@ from listening_port import free_port  # noqa: E402
 
 ZONES = ("zone", "zone_b")
 LISTENER = "listener"
-LEASE_S = 3
+LEASE_S, RENEW_S = 2, 0.5
 # One statement: one moment of the database.
 MAP = """SELECT json_build_object(
   'reports', (SELECT coalesce(json_agg(json_build_array(uuid, hazard_id)), '[]') FROM reports),
@@ -96,7 +96,7 @@ class FailoverWorld(World):
                             f"directory:={self.directory / name}", f"store_url:={self.url}", f"lease_s:={LEASE_S}",
                             f"broker_port:={self.ports['broker']}", f"identity:={self.directory / 'identity/zone'}",
                             "web_address:=0.0.0.0", f"web_port:={self.web_ports[name]}", "detect_for_small:=false",
-                            f"zone_cloudlet:={flow(zone_settings() | {'web': True})}"],
+                            f"zone_cloudlet:={flow(zone_settings() | {'web': True, 'lease_renew_s': RENEW_S})}"],
                      at_zone=True, master=self.ports[name])
             # The first one is to be the active one: its store is new.
             wait_until(lambda one=name: self.health(one), f"the start of {name}")
