@@ -23,8 +23,10 @@ constexpr double kBetterScore = 0.03;
 constexpr double kAgreementShare = 0.2;
 
 /// A keyframe whose points lie in less than this share of the cells of its image takes faint edges,
-/// too: what is in one corner leaves the view at once, and says little while it is there.
+/// too: what is in one corner leaves the view at once, and says little while it is there. Where
+/// those are no more, its finest level is a coarser one that has so many times more.
 constexpr double kEnoughCovered = 0.4;
+constexpr double kBetterCovered = 1.5;
 constexpr int kCellsAcross = 8, kCellsDown = 6;
 /// Faint edges are as strong as this, grey levels per px, and their points as steep as this.
 constexpr double kFaintEdgeGradient = 2;
@@ -247,25 +249,36 @@ void EdgeOdometry::ForgetNearOnes() {
 }
 
 bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
+  keyframe.finest_level = 0;
+  double best_covered = 0;
   for (int level = 0; level < cameras_.levels; ++level) {
-    const auto index = static_cast<std::size_t>(level);
-    PointSelection selection = config_.points;
-    selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
-    const cv::Mat& grey = keyframe.images[level];
-    const ReferenceLevel reference = {grey, keyframe.depths[level],
-                                      keyframe.inverse_depth_sigmas[level]};
-    const geo::CameraIntrinsics& camera = cameras_.camera[index];
-    selector_.Select(reference, extractor_.Extract(grey), camera, selection,
-                     keyframe.points[index]);
-    if (CoveredShare(keyframe.points[index], camera) >= kEnoughCovered) continue;
-    selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
-    selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection,
-                     keyframe.points[index]);
+    const double covered = std::min(kEnoughCovered, SelectPointsOf(level, keyframe));
+    if (level > 0 && covered < kBetterCovered * best_covered) continue;
+    keyframe.finest_level = level;
+    best_covered = covered;
   }
   selector_.SelectAll(keyframe.images.thumbnail(),
                       cameras_.camera[static_cast<std::size_t>(cameras_.levels)],
                       keyframe.thumbnail_points);
-  return keyframe.points[0].size() >= static_cast<std::size_t>(config_.min_points);
+  return keyframe.finest_points().size() >= static_cast<std::size_t>(config_.min_points);
+}
+
+/// The points of one level; the share of the image that they cover.
+double EdgeOdometry::SelectPointsOf(int level, Keyframe& keyframe) {
+  const auto index = static_cast<std::size_t>(level);
+  PointSelection selection = config_.points;
+  selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
+  const cv::Mat& grey = keyframe.images[level];
+  const ReferenceLevel reference = {grey, keyframe.depths[level],
+                                    keyframe.inverse_depth_sigmas[level]};
+  const geo::CameraIntrinsics& camera = cameras_.camera[index];
+  EdgePoints& points = keyframe.points[index];
+  selector_.Select(reference, extractor_.Extract(grey), camera, selection, points);
+  const double covered = CoveredShare(points, camera);
+  if (covered >= kEnoughCovered) return covered;
+  selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
+  selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection, points);
+  return CoveredShare(points, camera);
 }
 
 const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
@@ -304,7 +317,7 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   Attempt attempt;
   attempt.keyframe = &keyframe;
   AlignmentState state;
-  for (int level = cameras_.levels - 1; level >= 0; --level) {
+  for (int level = cameras_.levels - 1; level >= keyframe.finest_level; --level) {
     const EdgePoints& points = PointsOf(keyframe, level);
     if (level == cameras_.levels - 1) state = BestStart(points, level, guesses);
     attempt.fine = aligner_.Align(points, frame_images_[level],
@@ -363,7 +376,7 @@ void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
   const auto predicted = Predicted(stamp_ns);
   if (!attempt.ambiguous || !predicted || !settled_) return;
   const Eigen::Isometry3d expected = predicted->inverse() * attempt.keyframe->world_from_camera;
-  const double inverse_depth = attempt.keyframe->points[0].mean_inverse_depth;
+  const double inverse_depth = attempt.keyframe->finest_points().mean_inverse_depth;
   const double focal_px = cameras_.camera[0].fx;
   const auto surprise = [&](const AlignmentResult& result) {
     return PixelsBetween(result.state.new_from_reference, expected, inverse_depth, focal_px);
@@ -393,7 +406,7 @@ void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
           attempt.keyframe->world_from_camera;
   attempt.ambiguous = attempt.strange =
       PixelsBetween(attempt.fine.state.new_from_reference, rival,
-                    attempt.keyframe->points[0].mean_inverse_depth,
+                    attempt.keyframe->finest_points().mean_inverse_depth,
                     cameras_.camera[0].fx) > kRivalPx;
 }
 
@@ -436,14 +449,15 @@ bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) con
 /// One search among the proposals.
 EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
                                                 const MotionProposals& proposals) {
-  const auto points_of = [this, &keyframe](int level) -> const EdgePoints& {
+  WideSearch::Reference reference;
+  reference.finest_level = keyframe.finest_level;
+  reference.points_of = [this, &keyframe](int level) -> const EdgePoints& {
     return PointsOf(keyframe, level);
   };
-  const auto plausibility = [this, &keyframe](const Eigen::Isometry3d& motion) {
+  reference.plausibility = [this, &keyframe](const Eigen::Isometry3d& motion) {
     return SurfacesOf(keyframe, motion).value_or(1);
   };
-  const WideSearch::Outcome outcome =
-      wide_search_.Search(proposals, frame_images_, points_of, plausibility);
+  const WideSearch::Outcome outcome = wide_search_.Search(proposals, frame_images_, reference);
   Attempt attempt;
   attempt.keyframe = &keyframe;
   attempt.fine = outcome.best;
@@ -480,7 +494,7 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
     WideSearch::ProposeAround(*motion, proposals);
   }
   WideSearch::ProposeMoves(first.fine.state.new_from_reference,
-                           1 / keyframe.points[0].mean_inverse_depth, proposals);
+                           1 / keyframe.finest_points().mean_inverse_depth, proposals);
   WideSearch::ProposeFan(*guesses.begin(), proposals);
   Attempt second = SearchAmong(keyframe, proposals);
   second.iterations += first.iterations;
@@ -528,7 +542,8 @@ bool EdgeOdometry::IsGood(const Keyframe& keyframe, const AlignmentResult& resul
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
   return std::isfinite(result.cost) &&
-         IsBelievableMove(result.state.new_from_reference, keyframe.points[0].mean_inverse_depth) &&
+         IsBelievableMove(result.state.new_from_reference,
+                          keyframe.finest_points().mean_inverse_depth) &&
          result.state.new_from_reference.matrix().allFinite() &&
          determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
@@ -559,7 +574,8 @@ double EdgeOdometry::Motion(const Keyframe& keyframe, const Eigen::Isometry3d& w
                             const Eigen::Isometry3d& world_from_other) const {
   const Vector6d twist = Se3Log(world_from_other.inverse() * world_from_one);
   return cameras_.camera[0].fx / cameras_.camera[0].width *
-         (twist.head<3>().norm() * keyframe.points[0].mean_inverse_depth + twist.tail<3>().norm());
+         (twist.head<3>().norm() * keyframe.finest_points().mean_inverse_depth +
+          twist.tail<3>().norm());
 }
 
 VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {

@@ -90,7 +90,8 @@ class EdgeOdometry {
     /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
     double min_surfaces = 0.5;
     /// An alignment is doubted, and the motion searched widely, when its agreement is smaller by
-    /// this than what the last frames had, and by three times their mean deviation,
+    /// this than what the last frames had, and by three times their mean deviation, while the
+    /// points are further than half of `surprise` from where the last motion brings them,
     double agreement_drop = 0.04;
     /// or when so much less of the surfaces is where it should be than in the last frames, and
     /// less by three times their mean deviation,
@@ -99,7 +100,7 @@ class EdgeOdometry {
     /// an ambiguous one.
     double strange_drop = 0.06;
     /// A camera that finds back must agree as well as the last frames but for this, of the edges
-    /// and of the surfaces.
+    /// and of the surfaces. An alignment with less agreement than that is doubted, too,
     double found_drop = 0.15;
     /// or smaller than theirs by a fourth of that while the points are further than so much from
     /// where the last motion brings them, share of the image's width.
@@ -188,6 +189,7 @@ class EdgeOdometry {
   bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
                     const VoResult& result);
   bool SelectPoints(Keyframe& keyframe);
+  double SelectPointsOf(int level, Keyframe& keyframe);
   Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
   AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);
   const EdgePoints& PointsOf(Keyframe& keyframe, int level);

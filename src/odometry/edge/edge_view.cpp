@@ -24,7 +24,7 @@ cv::Mat DrawEdges(const cv::Mat& grey, const Keyframe& keyframe,
                   const geo::CameraIntrinsics& intrinsics) {
   cv::Mat picture;
   cv::cvtColor(grey / 2, picture, cv::COLOR_GRAY2BGR);
-  const EdgePoints& points = keyframe.points[0];
+  const EdgePoints& points = keyframe.finest_points();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d point =
         camera_from_keyframe *

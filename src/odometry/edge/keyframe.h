@@ -24,10 +24,15 @@ struct Keyframe {
   /// Standard deviations of the inverse depths, 1/m, where depths are estimates; else no levels.
   DepthPyramid inverse_depth_sigmas;
   std::array<EdgePoints, kMaxLevels> points;  ///< Under its own edges.
-  EdgePoints thumbnail_points;                ///< Every pixel of the thumbnail, for rotations.
+  /// The finest level whose points cover the picture, on which alignments end: a soft picture has
+  /// edges on coarse levels only.
+  int finest_level = 0;
+  EdgePoints thumbnail_points;  ///< Every pixel of the thumbnail, for rotations.
   /// Of its measured surfaces; none where depths are estimates.
   SurfacePoints surfaces;
   PictureFeatures features;  ///< Found when they are first needed.
+
+  const EdgePoints& finest_points() const { return points[static_cast<std::size_t>(finest_level)]; }
 };
 
 }  // namespace livemap::odometry

@@ -108,7 +108,7 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
   const ShiftSearch::Shifts shifts = shifts_.Find(keyframe.images.thumbnail(), images.thumbnail());
   if (shifts.count == 0) return false;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(cameras_.levels)];
-  const double depth_m = 1 / std::max(1e-3, keyframe.points[0].mean_inverse_depth);
+  const double depth_m = 1 / std::max(1e-3, keyframe.finest_points().mean_inverse_depth);
   for (const ShiftSearch::Shift& shift : shifts) {
     const double right = shift.x / camera.fx, down = shift.y / camera.fy;
     proposals.Add(MotionOfTwist(0, 0, 0, -down, right, 0));
@@ -150,8 +150,7 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
 }
 
 WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,
-                                       const PointsOfLevel& points_of,
-                                       const Plausibility& plausibility) {
+                                       const Reference& reference) {
   Outcome outcome;
   count_ = 0;
   for (const Eigen::Isometry3d& motion : proposals) {
@@ -160,9 +159,9 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   }
   if (count_ == 0) return outcome;
   double mean_inverse_depth = 0;
-  for (int level = cameras_.levels - 1; level >= 0; --level) {
-    const EdgePoints& points = points_of(level);
-    Refine(points, images[level], level, plausibility);
+  for (int level = cameras_.levels - 1; level >= reference.finest_level; --level) {
+    const EdgePoints& points = reference.points_of(level);
+    Refine(points, images[level], level, reference.plausibility);
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
     mean_inverse_depth = points.mean_inverse_depth;
   }

@@ -53,10 +53,15 @@ class WideSearch {
     AlignmentResult rival;  ///< That motion.
     int iterations = 0;
   };
-  /// The points to align on a level; asked for once per level.
-  using PointsOfLevel = std::function<const EdgePoints&(int level)>;
   /// What else is known for or against a motion: a factor of its score, 0 to 1.
   using Plausibility = std::function<double(const Eigen::Isometry3d& new_from_reference)>;
+  /// What is aligned with the images.
+  struct Reference {
+    /// The points to align on a level; asked for once per level.
+    std::function<const EdgePoints&(int level)> points_of;
+    Plausibility plausibility;
+    int finest_level = 0;  ///< The last one that is aligned.
+  };
 
   WideSearch(const AlignmentConfig& config, const LevelCameras& cameras)
       : aligner_(config), cameras_(cameras) {}
@@ -83,7 +88,7 @@ class WideSearch {
                            MotionProposals& proposals);
 
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
-                 const PointsOfLevel& points_of, const Plausibility& plausibility);
+                 const Reference& reference);
 
  private:
   struct Candidate {

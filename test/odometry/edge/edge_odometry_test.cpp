@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "common/error.h"
 #include "test/odometry/synthetic_scene.h"
@@ -149,6 +150,24 @@ TEST(EdgeOdometry, ACameraOfMediumSpeedKeepsItsKeyframeForSomeStepsToo) {
     keyframes += result.new_keyframe ? 1 : 0;
   }
   EXPECT_LE(keyframes, 5) << "each adds its error to the path";
+}
+
+TEST(EdgeOdometry, ASoftPictureIsFollowedOnACoarseLevel) {
+  cv::Mat spots(15, 21, CV_8UC1), picture;
+  cv::RNG(4).fill(spots, cv::RNG::UNIFORM, 120, 137);
+  cv::resize(spots, picture, {672, 480}, 0, 0, cv::INTER_CUBIC);
+  EdgeOdometry odometry({}, {520, 520, 319.5, 239.5, 640, 480});
+  VoResult result;
+  for (int i = 0; i < 4; ++i) {
+    RgbdFrame frame;
+    frame.stamp_ns = Stamp(i);
+    frame.grey = picture(cv::Rect(5 * i, 0, 640, 480)).clone();
+    frame.depth = cv::Mat(480, 640, CV_32FC1, cv::Scalar(2));
+    result = odometry.Track(frame);
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+  }
+  EXPECT_GT(odometry.keyframe()->finest_level, 0);
+  EXPECT_NEAR(result.world_from_camera.translation().x(), 15 * 2 / 520.0, 0.01);
 }
 
 TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {

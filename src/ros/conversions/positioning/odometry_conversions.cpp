@@ -76,7 +76,7 @@ sensor_msgs::PointCloud2 ToEdgeCloud(const odometry::Keyframe& keyframe,
   const Eigen::Isometry3f odom_from_keyframe =
       (frames.odom_from_first_base * frames.base_from_optical * world_from_keyframe).cast<float>();
   const auto scale = static_cast<float>(metres_per_unit);
-  const odometry::EdgePoints& points = keyframe.points[0];
+  const odometry::EdgePoints& points = keyframe.finest_points();
   auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZI>>();
   cloud->reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
