@@ -30,6 +30,13 @@ ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::s
   return {values.data() + begin, static_cast<Eigen::Index>(count)};
 }
 
+/// Points that follow each other err together; so many are one part of the covariance. There must
+/// be clearly more parts than unknowns.
+std::size_t PartSize(std::size_t points) {
+  constexpr std::size_t kParts = 32, kLeast = 16;
+  return std::clamp(points / kParts, kLeast, kChunk);
+}
+
 /// What the covariance says of movements that no edge shows: all but nothing. Edges of one
 /// direction leave one unseen; its variance is then a quotient of rounding errors, of either sign,
 /// or zero.
@@ -93,28 +100,43 @@ void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
         residuals.visible[point] = 0;
         continue;
       }
-      residuals.value[point] = Interpolate(grey, u, v) - gain * points.intensity[point] - bias;
-      if (!whitening_.empty()) residuals.value[point] *= whitening_[point];
+      residuals.value[point] =
+          whitening_[point] * (Interpolate(grey, u, v) - gain * points.intensity[point] - bias);
       residuals.visible[point] = 1;
       ++residuals.count;
     }
   }
 }
 
-/// Residuals of points whose depth is not exact err by that, too: equation (12) of
-/// docs/explanation/monocular-odometry.md. They are divided by how much more, at the motion that
-/// the alignment starts with.
+/// Residuals are divided by what they err by, as a multiple of the noise of a grey value: by the
+/// place of a steep edge, which is known to a part of a pixel only (Engel et al. 2018 weigh by the
+/// gradient, too), or by depths that are not exact, equation (12) of
+/// docs/explanation/monocular-odometry.md, at the motion that the alignment starts with. Those were
+/// estimated from the places of edges, so that what a place errs by is in them.
 void Aligner::Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference) {
-  whitening_.resize(points.inverse_depth_sigma.size());
-  const Eigen::Vector3f way =
-      (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
-  const auto grey_sigma = static_cast<float>(config_.grey_sigma);
-  for (std::size_t i = 0; i < whitening_.size(); ++i) {
-    const float by_inverse_depth =
-        points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
-                       points.jacobian[2][i] * way.z());
-    const float more = by_inverse_depth * points.inverse_depth_sigma[i] / grey_sigma;
-    whitening_[i] = 1 / std::sqrt(1 + more * more);
+  whitening_.resize(points.size());
+  const auto per_grey = static_cast<float>(1 / config_.grey_sigma);
+  const float per_slope = PerSlope(points);
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
+    Eigen::Map<Eigen::ArrayXf>(whitening_.data() + begin, static_cast<Eigen::Index>(count)) =
+        1 + (per_slope * AlignerPart(points.slope, begin, count)).square();
+  }
+  if (!points.inverse_depth_sigma.empty()) {
+    const Eigen::Vector3f way =
+        (new_from_reference.linear().transpose() * new_from_reference.translation()).cast<float>();
+    for (std::size_t i = 0; i < whitening_.size(); ++i) {
+      const float by_inverse_depth =
+          points.z[i] * (points.jacobian[0][i] * way.x() + points.jacobian[1][i] * way.y() +
+                         points.jacobian[2][i] * way.z());
+      const float more = by_inverse_depth * points.inverse_depth_sigma[i] * per_grey;
+      whitening_[i] += more * more;
+    }
+  }
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
+    const std::size_t count = std::min(kChunk, points.size() - begin);
+    Eigen::Map<Eigen::ArrayXf> factor(whitening_.data() + begin, static_cast<Eigen::Index>(count));
+    factor = factor.rsqrt();
   }
 }
 
@@ -159,8 +181,9 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
   gradient_.setZero();
   Eigen::Array<float, static_cast<int>(kChunk), kUnknowns> columns, weighted;
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
+  const std::size_t part_size = PartSize(points.size());
+  for (std::size_t begin = 0; begin < points.size(); begin += part_size) {
+    const std::size_t count = std::min(part_size, points.size() - begin);
     const auto n = static_cast<Eigen::Index>(count);
     const auto residual = AlignerPart(current_.value, begin, count);
     const auto visible = AlignerPart(current_.visible, begin, count);
@@ -170,20 +193,14 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
     }
     columns.col(6).head(n) = AlignerPart(points.intensity, begin, count);
     columns.col(7).head(n).setOnes();
-    if (!whitening_.empty()) {
-      for (int i = 0; i < kUnknowns; ++i) {
-        columns.col(i).head(n) *= AlignerPart(whitening_, begin, count);
-      }
-    }
-    const Chunk weight_all = [&] {
-      Chunk weight;
-      weight.head(n) = visible * (k / residual.abs().max(k));
-      return weight;
-    }();
+    const auto factor = AlignerPart(whitening_, begin, count);
+    Chunk weight_all, grey_levels;
+    weight_all.head(n) = visible * factor.square() * (k / residual.abs().max(k));
+    grey_levels.head(n) = residual / factor;
     Step part = Step::Zero();
     for (int i = 0; i < unknowns; ++i) {
       weighted.col(i).head(n) = weight_all.head(n) * columns.col(i).head(n);
-      part[i] = static_cast<double>((weighted.col(i).head(n) * residual).sum());
+      part[i] = static_cast<double>((weighted.col(i).head(n) * grey_levels.head(n)).sum());
       for (int j = 0; j <= i; ++j) {
         normal_(i, j) +=
             static_cast<double>((weighted.col(i).head(n) * columns.col(j).head(n)).sum());
@@ -266,7 +283,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
   Summarise(sigma, result);
-  CountExplained(points, camera, result);
+  CountExplained(points, result);
   return result;
 }
 
@@ -278,18 +295,20 @@ double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
   return RobustCost(candidate_, sigma);
 }
 
-void Aligner::CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
-                             AlignmentResult& result) const {
-  const auto per_px_x = static_cast<float>(1 / camera.fx);
-  const auto per_px_y = static_cast<float>(1 / camera.fy);
+/// By how much the residual of an edge errs more for each grey level per px of its slope.
+float Aligner::PerSlope(const EdgePoints& points) const {
+  if (!points.inverse_depth_sigma.empty()) return 0;
+  return static_cast<float>(config_.place_sigma_px / config_.grey_sigma);
+}
+
+void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) const {
   const auto gain = static_cast<float>(result.state.gain);
+  const float per_slope = PerSlope(points);
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);
-    const auto z = AlignerPart(points.z, begin, count);
-    const auto gradient_x = AlignerPart(points.jacobian[0], begin, count) * z * per_px_x;
-    const auto gradient_y = AlignerPart(points.jacobian[1], begin, count) * z * per_px_y;
+    const auto slope = AlignerPart(points.slope, begin, count);
     const auto bound =
-        (gain * kExplainedPx * (gradient_x.square() + gradient_y.square()).sqrt()).max(kNoiseGrey);
+        (gain * kExplainedPx * slope).max(kNoiseGrey) / (1 + (per_slope * slope).square()).sqrt();
     result.explained += static_cast<std::size_t>(
         ((AlignerPart(current_.value, begin, count).abs() <= bound).cast<float>() *
          AlignerPart(current_.visible, begin, count))
@@ -317,7 +336,9 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const Eigen::LDLT<UpToEight> factors(normal_.topLeftCorner(unknowns, unknowns));
   const UpToEight half = factors.solve(scatter_.topLeftCorner(unknowns, unknowns));
   // Parts that the unknowns were fitted to contradict each other less than others would.
-  const double parts = std::max(2.0, static_cast<double>(current_.value.size()) / kChunk / 6);
+  const std::size_t size = current_.value.size();
+  const double parts =
+      std::max(2.0, static_cast<double>(size) / static_cast<double>(6 * PartSize(size)));
   const UpToEight whole = factors.solve(half.transpose());
   result.covariance =
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);

@@ -24,7 +24,10 @@ struct AlignmentConfig {
   int max_iterations = 12;  ///< Per level.
   double huber_k = 2.0;     ///< In standard deviations of the residuals.
   double min_sigma = 1.5;   ///< Noise below which no residual counts as an outlier, grey levels.
-  double grey_sigma = 2.0;  ///< Of residuals whose depth is exact, against those where it is not.
+  double grey_sigma = 2.0;  ///< Of residuals of gentle slopes whose depth is exact.
+  /// Of the place of an edge, px, as of a pixel that sees one ray (1/sqrt(12)): what is steep errs
+  /// by more grey levels.
+  double place_sigma_px = 0.3;
   double converged_px = 0.03;  ///< A step that moves points less than this is the last.
   bool estimate_illumination = true;
   bool rotation_only = false;
@@ -96,13 +99,13 @@ class Aligner {
   void BuildNormalEquations(const EdgePoints& points, double sigma);
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
-  void CountExplained(const EdgePoints& points, const geo::CameraIntrinsics& camera,
-                      AlignmentResult& result) const;
+  float PerSlope(const EdgePoints& points) const;
+  void CountExplained(const EdgePoints& points, AlignmentResult& result) const;
   void Summarise(double sigma, AlignmentResult& result) const;
 
   AlignmentConfig config_;
   Residuals current_, candidate_;
-  std::vector<float> whitening_;  // Factors of the residuals; empty: all 1.
+  std::vector<float> whitening_;  // Factors of the residuals.
   Normal normal_;
   Normal scatter_;  // Sum over parts of the image of their gradient's square.
   Step gradient_;

@@ -12,6 +12,8 @@ namespace {
 constexpr int kBorderPx = 2;
 /// Of an edge, from 0 to half a turn.
 constexpr std::size_t kDirections = 8;
+/// Of the lines of one direction.
+constexpr std::size_t kLineOffsets = 128;
 
 float HalfPointDifference(int before, int after) {
   return 0.5F * static_cast<float>(after - before);
@@ -102,12 +104,13 @@ void ForEachPointSet(const std::uint8_t* mask, int begin, int end, const Visit& 
 }  // namespace
 
 void EdgePoints::Clear() {
-  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma}) values->clear();
+  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma, &slope}) values->clear();
   for (auto& column : jacobian) column.clear();
 }
 
 void EdgePoints::Reserve(std::size_t count) {
-  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma}) values->reserve(count);
+  for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma, &slope})
+    values->reserve(count);
   for (auto& column : jacobian) column.reserve(count);
 }
 
@@ -121,6 +124,7 @@ void EdgePoints::Add(float u, float v, float depth_m, float grey, float gradient
   y.push_back(py);
   z.push_back(depth_m);
   intensity.push_back(grey);
+  slope.push_back(std::sqrt(gradient_x * gradient_x + gradient_y * gradient_y));
   // Gradient by the point, equation (5); by its motion, equation (6).
   const float a = gradient_x * fx / depth_m;
   const float b = gradient_y * fy / depth_m;
@@ -157,24 +161,29 @@ void PointSelector::Select(const ReferenceLevel& reference, const cv::Mat& edges
     return;
   }
   points.Clear();
-  Thin(reference.grey, selection.max_points);
+  FindDirections(reference.grey);
+  Thin(selection.max_points);
+  OrderByLines(reference.grey.size());
   for (const Pixel& pixel : candidates_) {
     if (IsUsablePoint(reference, pixel, selection)) AddEdgePoint(reference, pixel, camera, points);
   }
   points.Finish();
 }
 
+void PointSelector::FindDirections(const cv::Mat& grey) {
+  directions_.resize(candidates_.size());
+  std::transform(
+      candidates_.begin(), candidates_.end(), directions_.begin(),
+      [&grey](const Pixel& pixel) { return DirectionOf(PointGradientAt(grey, pixel.x, pixel.y)); });
+}
+
 /// Leaves at most so many candidates, in their order. Directions that are rare keep theirs: a wall
 /// of stripes must not outvote the few edges that say how far the camera moved along it
 /// (Rusinkiewicz and Levoy 2001, normal-space sampling, of the image's gradients).
-void PointSelector::Thin(const cv::Mat& grey, std::size_t most) {
+void PointSelector::Thin(std::size_t most) {
   if (candidates_.size() <= most) return;
-  directions_.resize(candidates_.size());
   std::array<std::size_t, kDirections> counts{};
-  for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    directions_[i] = DirectionOf(PointGradientAt(grey, candidates_[i].x, candidates_[i].y));
-    ++counts[directions_[i]];
-  }
+  for (const std::uint8_t direction : directions_) ++counts[direction];
   const std::array<std::size_t, kDirections> shares = FairShares(counts, most);
   std::array<std::size_t, kDirections> seen{};
   std::size_t kept = 0;
@@ -182,10 +191,37 @@ void PointSelector::Thin(const cv::Mat& grey, std::size_t most) {
     const std::size_t direction = directions_[i];
     const std::size_t before = seen[direction]++ * shares[direction] / counts[direction];
     if (seen[direction] * shares[direction] / counts[direction] > before) {
+      directions_[kept] = directions_[i];
       candidates_[kept++] = candidates_[i];
     }
   }
   candidates_.resize(kept);
+  directions_.resize(kept);
+}
+
+/// Puts pixels of one straight line one after the other: they err together, by aliasing or by a
+/// depth, and the alignment's covariance takes those that follow each other for one part.
+void PointSelector::OrderByLines(cv::Size size) {
+  std::array<std::size_t, kDirections * kLineOffsets + 1> begins{};
+  std::array<Gradient, kDirections> across{};  // By part of the image's reach.
+  const auto reach = static_cast<float>(2 * (size.width + size.height));
+  for (std::size_t i = 0; i < kDirections; ++i) {
+    const float angle = static_cast<float>(i) * static_cast<float>(M_PI) / kDirections;
+    across[i] = {std::cos(angle) / reach, std::sin(angle) / reach};
+  }
+  const auto line_of = [&](std::size_t i) {
+    const Gradient& normal = across[directions_[i]];
+    const float offset = 0.5F + normal.x * static_cast<float>(candidates_[i].x) +
+                         normal.y * static_cast<float>(candidates_[i].y);
+    return directions_[i] * kLineOffsets + static_cast<std::size_t>(offset * kLineOffsets);
+  };
+  for (std::size_t i = 0; i < candidates_.size(); ++i) ++begins[line_of(i) + 1];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  ordered_.resize(candidates_.size());
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    ordered_[begins[line_of(i)]++] = candidates_[i];
+  }
+  std::swap(candidates_, ordered_);
 }
 
 /// From the pixels under the mask. Both random choices take equally many: they are counted and

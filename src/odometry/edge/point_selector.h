@@ -24,6 +24,8 @@ struct EdgePoints {
   std::array<std::vector<float>, 6> jacobian;
   /// Standard deviation of the inverse depth, 1/m; empty: depths are exact.
   std::vector<float> inverse_depth_sigma;
+  /// Length of the reference's gradient there, grey levels per px.
+  std::vector<float> slope;
   double mean_inverse_depth = 0;  ///< 1/m
 
   std::size_t size() const { return x.size(); }
@@ -78,6 +80,7 @@ class PointSelector {
   void Reserve(std::size_t pixels) {
     candidates_.reserve(pixels);
     directions_.reserve(pixels);
+    ordered_.reserve(pixels);
   }
   /// Points of the reference under `edges`, an image of the same size.
   void Select(const ReferenceLevel& reference, const cv::Mat& edges,
@@ -87,12 +90,15 @@ class PointSelector {
   void SelectAll(const cv::Mat& grey, const geo::CameraIntrinsics& camera, EdgePoints& points);
 
  private:
-  void Thin(const cv::Mat& grey, std::size_t most);
+  void FindDirections(const cv::Mat& grey);
+  void Thin(std::size_t most);
+  void OrderByLines(cv::Size size);
   void SelectAtRandom(const ReferenceLevel& reference, const geo::CameraIntrinsics& camera,
                       const PointSelection& selection, EdgePoints& points);
 
   std::vector<Pixel> candidates_;
   std::vector<std::uint8_t> directions_;  // Of the candidates.
+  std::vector<Pixel> ordered_;
   std::mt19937 random_;
 };
 
