@@ -433,17 +433,21 @@ bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
              std::min(LeastSurfaces(), usual_surfaces_ - config_.found_drop);
 }
 
-/// Whether an alignment that began at a guess may have ended in a false minimum.
+/// Whether an alignment that began at a guess may have ended in a false minimum. The further a
+/// keyframe is, the less of it is explained, so that a smaller agreement alone says little where
+/// the motion goes on as it was. Where depths are estimates, it says that the depths err.
 bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
   if (!attempt.good || !settled_) return true;
   const double drop = usual_agreement_ - attempt.fine.Agreement();
-  if (drop > UsualDrop()) return true;
+  const bool exact = attempt.keyframe->finest_points().inverse_depth_sigma.empty();
+  if (drop > (exact ? std::max(config_.found_drop, UsualDrop()) : UsualDrop())) return true;
   if (drop < UsualDrop() / 4 && !IsDisplaced(attempt)) return false;
   const auto predicted = Predicted(stamp_ns);
   if (!predicted) return true;
   const Eigen::Isometry3d reference_from_new = attempt.fine.state.new_from_reference.inverse();
-  return Motion(*attempt.keyframe, *predicted,
-                attempt.keyframe->world_from_camera * reference_from_new) > config_.surprise;
+  const double surprise = Motion(*attempt.keyframe, *predicted,
+                                 attempt.keyframe->world_from_camera * reference_from_new);
+  return surprise > (drop > UsualDrop() ? config_.surprise / 2 : config_.surprise);
 }
 
 /// One search among the proposals.

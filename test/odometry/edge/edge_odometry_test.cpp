@@ -170,6 +170,30 @@ TEST(EdgeOdometry, ASoftPictureIsFollowedOnACoarseLevel) {
   EXPECT_NEAR(result.world_from_camera.translation().x(), 15 * 2 / 520.0, 0.01);
 }
 
+TEST(EdgeOdometry, LessAgreementStartsNoSearchWhileTheMotionGoesOn) {
+  const SyntheticWall wall(kWallCamera);
+  EdgeOdometry odometry({}, kWallCamera);
+  VoResult result;
+  for (int i = 0; i < 8; ++i) {
+    RgbdFrame frame = wall.See(Stamp(i), Pose(0.01 * i, 0, 0, 0, 0, 0));
+    if (i == 7) {
+      // One cell in sixteen shows something else.
+      for (int v = 0; v < frame.grey.rows; v += 40) {
+        for (int u = 0; u < frame.grey.cols; u += 40) {
+          frame.grey(cv::Rect(u, v, 10, 10)).setTo(10);
+        }
+      }
+    }
+    const double before = result.agreement;
+    result = odometry.Track(frame);
+    if (i == 7) {
+      EXPECT_LT(result.agreement, before - 0.04);
+    }
+  }
+  EXPECT_EQ(result.state, VoState::kTracking);
+  EXPECT_LT(result.iterations, 50);
+}
+
 TEST(EdgeOdometry, TwistIsTheVelocityInTheCamera) {
   const SyntheticWall wall(kWallCamera);
   EdgeOdometry odometry({}, kWallCamera);
