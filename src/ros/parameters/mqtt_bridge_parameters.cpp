@@ -298,13 +298,13 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
   if (config.role == BridgeRole::kVehicle) {
     ReadZoneHandover(parameters, config);
   } else {
-    ReadDirectoryHandout(parameters, config);
     parameters.Read("active_timeout_s", config.active_timeout_s, {0, 600},
                     "The bridge is connected only while zone_cloudlet has said on zone/active, "
                     "less than this time ago, that it is the zone's active process "
                     "(docs/how-to/run-a-standby.md). 0: it is always connected. zone.launch sets "
                     "it by the argument `lease_s`.",
                     "s");
+    ReadDirectoryHandout(parameters, config);
   }
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);

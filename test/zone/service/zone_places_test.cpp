@@ -153,13 +153,13 @@ TEST_F(ZonePlacesTest, ImpossiblePositionsAreRefusedAndCountedByTheirKind) {
   EXPECT_FALSE(with([](VehicleState& v) { v.position = {91, 0}; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.vehicle_id = "car-1 "; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.drive_id = "\xe3\x80\x80"; }));
-  EXPECT_EQ(Refused(RefusalKind::kMalformed), 9U);
+  EXPECT_EQ(Refused(RefusalKind::kMalformed), 11U);
   EXPECT_FALSE(with([](VehicleState& v) { v.stamp_ns = 0; }));
   EXPECT_FALSE(with([](VehicleState& v) { v.stamp_ns -= 31 * kOneDay; }));
   EXPECT_EQ(Refused(RefusalKind::kTooOld), 2U);
   EXPECT_FALSE(with([](VehicleState& v) { v.stamp_ns = 4'294'967'000'000'000'000; }));
   EXPECT_EQ(Refused(RefusalKind::kFuture), 1U);
-  EXPECT_EQ(Zone().Statistics().vehicle_positions_refused, 15U);
+  EXPECT_EQ(Zone().Statistics().vehicle_positions_refused, 17U);
   EXPECT_TRUE(Zone().Vehicles().empty());
   EXPECT_TRUE(with([](VehicleState& v) { v.course_rad = kNan; })) << "it stands";
 }
