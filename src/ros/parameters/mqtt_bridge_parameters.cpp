@@ -226,6 +226,7 @@ void SetZoneBridgeDefaults(transport::MqttConfig& mqtt) {
 }
 
 void ReadBridgeZoneDirectory(ParameterReader& parameters, BridgeConfig& config) {
+  parameters.Section("Zone directory");
   config.zones.zone = config.zone;
   ReadZoneDirectory(parameters, config.zones,
                     "File of the authority's signed zone directory "
@@ -237,8 +238,6 @@ void ReadBridgeZoneDirectory(ParameterReader& parameters, BridgeConfig& config) 
 }
 
 void ReadDirectoryHandout(ParameterReader& parameters, BridgeConfig& config) {
-  parameters.Section("Zone directory");
-  ReadBridgeZoneDirectory(parameters, config);
   parameters.Read("zone_directory_repeat_s", config.handout.repeat_s, {1, 86400},
                   "A vehicle is given the directory at its first message, at the first one after "
                   "the directory changed, and again after this time.",
@@ -252,7 +251,6 @@ void ReadZoneHandover(ParameterReader& parameters, BridgeConfig& config) {
                      "(docs/explanation/changing-zones.md). `zone`, `host` and `port` then are "
                      "those of the zone until the first position comes, and where no directory "
                      "counts.");
-  ReadBridgeZoneDirectory(parameters, config);
   parameters.Read("zone_hysteresis_m", handover.choice.hysteresis_m, {0, 10000},
                   "The vehicle changes to another zone once it lies deeper in that by this.", "m");
   parameters.Read("zone_max_gap_m", handover.choice.max_gap_m, {0, 100000},
@@ -295,16 +293,19 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
                   "s");
   config.mqtt.tls = ReadMqttTlsOptions(parameters);
   ReadMqttConnection(parameters, config.mqtt);
-  if (config.role == BridgeRole::kVehicle) {
-    ReadZoneHandover(parameters, config);
-  } else {
+  if (config.role == BridgeRole::kZone) {
     parameters.Read("active_timeout_s", config.active_timeout_s, {0, 600},
                     "The bridge is connected only while zone_cloudlet has said on zone/active, "
                     "less than this time ago, that it is the zone's active process "
                     "(docs/how-to/run-a-standby.md). 0: it is always connected. zone.launch sets "
                     "it by the argument `lease_s`.",
                     "s");
+  }
+  ReadBridgeZoneDirectory(parameters, config);
+  if (config.role == BridgeRole::kZone) {
     ReadDirectoryHandout(parameters, config);
+  } else {
+    ReadZoneHandover(parameters, config);
   }
   parameters.Section("Period of the diagnostics");
   ReadDiagnosticsPeriod(parameters, config.diagnostics_period_s, 0.1);
