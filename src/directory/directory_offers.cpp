@@ -1,5 +1,7 @@
 #include "directory/directory_offers.h"
 
+#include <algorithm>
+
 #include "directory/directory_keeper.h"
 
 namespace livemap::directory {
@@ -10,14 +12,19 @@ std::optional<std::string> DirectoryOffers::Put(const std::string& zone,
     return "the offered zone directory has " + std::to_string(payload.size) +
            " bytes, accepted are at most " + std::to_string(DirectoryKeeper::kMaxBytes);
   }
-  std::string bytes(payload.data, payload.data + payload.size);
   const MutexLock lock(mutex_);
-  offers_.insert_or_assign(zone, std::move(bytes));
+  const auto waiting = std::count_if(offers_.begin(), offers_.end(),
+                                     [&zone](const auto& offer) { return offer.first == zone; });
+  if (static_cast<std::size_t>(waiting) >= kMostOfAZone) {
+    return "the offered zone directory comes while " + std::to_string(waiting) +
+           " of its zone wait, accepted are at most " + std::to_string(kMostOfAZone);
+  }
+  offers_.emplace_back(zone, std::string(payload.data, payload.data + payload.size));
   return std::nullopt;
 }
 
-std::map<std::string, std::string> DirectoryOffers::Take() {
-  std::map<std::string, std::string> taken;
+std::vector<std::pair<std::string, std::string>> DirectoryOffers::Take() {
+  std::vector<std::pair<std::string, std::string>> taken;
   const MutexLock lock(mutex_);
   taken.swap(offers_);
   return taken;

@@ -20,13 +20,25 @@ transport::ByteView View(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-TEST(DirectoryOffersTest, TheLastOneOfEachZoneIsTakenOnce) {
+TEST(DirectoryOffersTest, AllAreTakenOnceAsTheyCame) {
   DirectoryOffers offers;
-  EXPECT_EQ(offers.Put("west", View("first")), std::nullopt);
+  EXPECT_EQ(offers.Put("west", View("forged")), std::nullopt);
   EXPECT_EQ(offers.Put("east", View("other")), std::nullopt);
-  EXPECT_EQ(offers.Put("west", View("second")), std::nullopt);
-  EXPECT_THAT(offers.Take(), ElementsAre(Pair("east", "other"), Pair("west", "second")));
+  EXPECT_EQ(offers.Put("west", View("true")), std::nullopt);
+  EXPECT_THAT(offers.Take(),
+              ElementsAre(Pair("west", "forged"), Pair("east", "other"), Pair("west", "true")));
   EXPECT_THAT(offers.Take(), IsEmpty());
+}
+
+TEST(DirectoryOffersTest, AZoneThatSendsTooManyPushesOutNoOtherZones) {
+  DirectoryOffers offers;
+  for (std::size_t i = 0; i < DirectoryOffers::kMostOfAZone; ++i) {
+    EXPECT_EQ(offers.Put("west", View("one of many")), std::nullopt);
+  }
+  EXPECT_THAT(offers.Put("west", View("one too many")), Optional(HasSubstr("at most 4")));
+  EXPECT_EQ(offers.Put("east", View("other")), std::nullopt);
+  EXPECT_EQ(offers.Take().size(), DirectoryOffers::kMostOfAZone + 1);
+  EXPECT_EQ(offers.Put("west", View("again")), std::nullopt);
 }
 
 TEST(DirectoryOffersTest, WhatIsLargerThanAnyDirectoryIsRefusedAndLeavesWhatCameBefore) {
