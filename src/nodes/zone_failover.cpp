@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdlib>
 #include <optional>
-#include <utility>
 
 #include "common/clock.h"
 #include "nodes/json_log.h"
@@ -27,10 +26,10 @@ std::string NameOfThisProcess() {
 
 }  // namespace
 
-ZoneFailover::ZoneFailover(ros::NodeHandle node, const ros::NodeHandle& private_node,
+ZoneFailover::ZoneFailover(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                            const ros_io::ZoneCloudletConfig& config)
     : config_(config),
-      node_(std::move(node)),
+      node_(node),
       private_node_(private_node),
       lease_(std::make_shared<zone::ZoneLease>(
           zone::ZoneLease::Config{config.zone.store_url, NameOfThisProcess(), config.lease_s})) {

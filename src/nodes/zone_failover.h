@@ -33,7 +33,7 @@ namespace livemap::nodes {
 class ZoneFailover {
  public:
   /// Connects to the database. Throws Error with one sentence.
-  ZoneFailover(ros::NodeHandle node, const ros::NodeHandle& private_node,
+  ZoneFailover(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                const ros_io::ZoneCloudletConfig& config);
   /// Gives the lease back: the zone's node has ended before.
   ~ZoneFailover();

@@ -38,7 +38,8 @@ void AppendNumber(std::string& text, double number, int digits) {
 }
 
 void AppendSeconds(std::string& text, std::int64_t time_ns) {
-  AppendNumber(text, static_cast<double>(time_ns / 1'000'000) / 1000.0, 3);
+  const std::int64_t time_ms = time_ns / 1'000'000;
+  AppendNumber(text, static_cast<double>(time_ms) / 1000.0, 3);
 }
 
 /// One line of the points, in the order of kPointColumns. Written by hand: a list has a hundred

@@ -492,8 +492,8 @@ const Statements& PostgresqlSchemaOfVersion8() {
            from_uuid VARCHAR(36) NOT NULL,
            hazard_uuid VARCHAR(36) NOT NULL))",
       // One row: who writes here, and how often it has committed (ZoneStoreOwner).
-      "CREATE TABLE livemap_owner (token VARCHAR(36) NOT NULL, commits BIGINT NOT NULL) WITH "
-      "(fillfactor = 50)",
+      R"(CREATE TABLE livemap_owner (token VARCHAR(36) NOT NULL, commits BIGINT NOT NULL)
+           WITH (fillfactor = 50))",
       "INSERT INTO livemap_schema (version) VALUES (8)"};
   return kStatements;
 }
