@@ -159,4 +159,20 @@ inline bool SameHazard(const Hazard& a, const Hazard& b) {
          a.announced_sequence == b.announced_sequence;
 }
 
+/// A zone's test with a server of PostgreSQL of its own, which it may kill; skipped where none is
+/// installed.
+class PostgresqlZoneTest : public ZoneTest {
+ protected:
+  void SetUp() override {
+    if (!test::PostgresqlServer::IsInstalled()) {
+      GTEST_SKIP() << "skipped, no PostgreSQL server installed";
+    }
+    server_ = std::make_unique<test::PostgresqlServer>();
+    url_ = server_->MakeDatabase();
+  }
+
+  std::unique_ptr<test::PostgresqlServer> server_;
+  std::string url_;  ///< Of an empty database of that server.
+};
+
 }  // namespace livemap::zone

@@ -24,16 +24,8 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-/// With a server of its own, which a test may kill.
-class PostgresqlStoreTest : public ZoneTest {
+class PostgresqlStoreTest : public PostgresqlZoneTest {
  protected:
-  void SetUp() override {
-    if (!test::PostgresqlServer::IsInstalled()) {
-      GTEST_SKIP() << "skipped, no PostgreSQL server installed";
-    }
-    server_ = std::make_unique<test::PostgresqlServer>();
-    url_ = server_->MakeDatabase();
-  }
   ZoneService::Config OnServer(const std::string& name = "zone") const {
     ZoneService::Config config = Config();
     config.directory = directory_ + "/" + name;
@@ -55,9 +47,6 @@ class PostgresqlStoreTest : public ZoneTest {
     EXPECT_EQ(probe.Number("SELECT sum(sightings) FROM hazards"), reports);
     EXPECT_EQ(probe.Number("SELECT count(*) FROM events"), reports);
   }
-
-  std::unique_ptr<test::PostgresqlServer> server_;
-  std::string url_;
 };
 
 /// As a vehicle does: the same report again until it is answered. How often it was refused.

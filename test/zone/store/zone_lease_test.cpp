@@ -23,15 +23,8 @@ using testing::HasSubstr;
 
 constexpr double kLongS = 3600;
 
-class ZoneLeaseTest : public ZoneTest {
+class ZoneLeaseTest : public PostgresqlZoneTest {
  protected:
-  void SetUp() override {
-    if (!test::PostgresqlServer::IsInstalled()) {
-      GTEST_SKIP() << "skipped, no PostgreSQL server installed";
-    }
-    server_ = std::make_unique<test::PostgresqlServer>();
-    url_ = server_->MakeDatabase();
-  }
   std::shared_ptr<ZoneLease> MakeLease(const std::string& holder) const {
     return std::make_shared<ZoneLease>(ZoneLease::Config{url_, holder, kLongS});
   }
@@ -50,9 +43,6 @@ class ZoneLeaseTest : public ZoneTest {
   double Count(const std::string& table) const {
     return StoreProbe(url_).Number("SELECT count(*) FROM " + table);
   }
-
-  std::unique_ptr<test::PostgresqlServer> server_;
-  std::string url_;
 };
 
 std::string WhyHandlingFailed(ZoneService& zone, const protocol::Report& report) {
