@@ -28,9 +28,10 @@ the page counts
   another hazard than the database has, or a gap or a repetition in the database's numbers;
 - **wrote late**: a paused process that wrote after it lost its lease.
 
-**Map back** is the time from the signal until the other process answers `/readyz` and
-`/api/v1/hazards` with status 200 and its map holds every event that the database had when the fault
-struck. After SIGCONT the page waits until the paused process has ended by itself.
+**Map back** is the time from the signal until a process answers `/readyz` and `/api/v1/hazards` with
+status 200 and its map holds every event that the database had when the fault struck. **By the
+standby** counts the rounds in which that was the other process. In the rest roslaunch started the
+killed one again within the lease, and it won the race for it. After SIGCONT the page waits until the paused process has ended by itself.
 
 ```
 ./livemap bench faults --only kill_active --only pause_active
@@ -38,7 +39,7 @@ struck. After SIGCONT the page waits until the paused process has ended by itsel
 
 """
 COLUMNS = ("fault", "rounds", "reports", "lost", "doubled", "unknown", "stuck", "late", "wrong numbers", "wrote late",
-           "map back p50, s", "p95, s", "longest, s", "reports answered p50, s", "longest, s", "at")
+           "by the standby", "map back p50, s", "p95, s", "longest, s", "reports answered p50, s", "longest, s", "at")
 
 
 def row(kind, records):
@@ -46,7 +47,7 @@ def row(kind, records):
     back = [record["map_back_s"] for record in done]
     recoveries = [record["recovery_s"] for record in done if record["recovery_s"] is not None]
     sums = [str(sum(record.get(key, 0) for record in done)) for key in
-            ("reports", "lost", "doubled", "unknown", "stuck", "late", "event_numbers_wrong", "wrote_late")]
+            ("reports", "lost", "doubled", "unknown", "stuck", "late", "event_numbers_wrong", "wrote_late", "by_standby")]
     figures = [fault_page.quantile(back, 0.5), fault_page.quantile(back, 0.95), fault_page.quantile(back, 1),
                fault_page.quantile(recoveries, 0.5), fault_page.quantile(recoveries, 1)]
     return [failover_kinds.KINDS[kind].words, str(len(done)), *sums, *figures,
