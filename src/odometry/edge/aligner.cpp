@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "odometry/bilinear.h"
+#include "odometry/edge/seen_movements.h"
 
 namespace livemap::odometry {
 namespace {
@@ -19,7 +21,10 @@ constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
 constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
 constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
-constexpr double kMinGain = 0.25;      // A black image must not explain everything.
+/// Of a gradient, what its direction errs by: a pixel that sees one ray makes steps of slanted
+/// edges.
+constexpr float kJaggedShare = 0.12F;
+constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
 /// Of the unknowns that are solved for; lies on the stack.
 using UpToEight = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8>;
@@ -37,11 +42,15 @@ std::size_t PartSize(std::size_t points) {
   return std::clamp(points / kParts, kLeast, kChunk);
 }
 
-/// What the covariance says of movements that no edge shows: all but nothing. Edges of one
+/// What the covariance says of movements that no edge shows, square metres and radians: all but
+/// nothing.
+constexpr double kUnseen = 100;
+
+/// With the movements that no edge shows. Edges of one
 /// direction leave one unseen; its variance is then a quotient of rounding errors, of either sign,
 /// or zero.
 Matrix6d WithUnseen(const Matrix6d& covariance, const Matrix6d& information) {
-  constexpr double kUnseen = 100, kSeenShare = 1e-9;  // Square metres and radians.
+  constexpr double kSeenShare = 1e-9;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> known(information);
   const double most = known.eigenvalues().maxCoeff();
   if (!covariance.allFinite() || !(most > 0)) return kUnseen * Matrix6d::Identity();
@@ -255,12 +264,18 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   double cost = RobustCost(current_, sigma);
   double damping = 0;
   bool stale = true;
+  std::optional<SeenMovements> seen;
   Step step;
   while (result.iterations < config_.max_iterations && std::isfinite(cost)) {
     ++result.iterations;
     if (stale) BuildNormalEquations(points, sigma);
     stale = false;
+    if (!seen && points.gradient_noise > 0) {
+      seen.emplace(PoseInformation(), NoiseInformation(points, camera, sigma));
+    }
     if (!Solve(damping, step)) break;
+    // Else noise would move the camera along stripes.
+    if (seen && !seen->All()) step.head<6>() = seen->Told(step.head<6>());
     const AlignmentState moved = Moved(result.state, step);
     Evaluate(points, grey, camera, moved, candidate_);
     const double new_cost = RobustCost(candidate_, sigma);
@@ -282,7 +297,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   if (stale) BuildNormalEquations(points, sigma);
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
-  Summarise(sigma, result);
+  Summarise(points, camera, sigma, result);
   CountExplained(points, result);
   return result;
 }
@@ -316,7 +331,41 @@ void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) 
   }
 }
 
-void Aligner::Summarise(double sigma, AlignmentResult& result) const {
+/// As BuildNormalEquations with the variance of the noise in the place of the gradients' squares;
+/// some of the points say enough.
+Matrix6d Aligner::NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                                   double sigma) const {
+  constexpr std::size_t kEvery = 8;
+  Eigen::Matrix<float, 6, 6> sum = Eigen::Matrix<float, 6, 6>::Zero();
+  const auto k = static_cast<float>(config_.huber_k * sigma);
+  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
+  Eigen::Matrix<float, 6, 1> across, down;
+  for (std::size_t i = 0; i < points.size(); i += kEvery) {
+    if (current_.visible[i] == 0) continue;
+    const float inverse = 1 / points.z[i], x = points.x[i] * inverse, y = points.y[i] * inverse;
+    across << inverse, 0, -x * inverse, -x * y, 1 + x * x, -y;
+    down << 0, inverse, -y * inverse, -1 - y * y, x * y, x;
+    const float jagged = kJaggedShare * points.slope[i];
+    const float noise = static_cast<float>(points.gradient_noise) + jagged * jagged;
+    const float weight =
+        noise * whitening_[i] * whitening_[i] * k / std::max(std::abs(current_.value[i]), k);
+    sum += (weight * fx * fx) * across * across.transpose() +
+           (weight * fy * fy) * down * down.transpose();
+  }
+  return static_cast<double>(kEvery) * sum.cast<double>();
+}
+
+Matrix6d Aligner::PoseInformation() const {
+  Matrix6d pose = normal_.topLeftCorner<6, 6>();
+  if (!config_.estimate_illumination) return pose;
+  const Eigen::Matrix2d light = normal_.bottomRightCorner<2, 2>();
+  const Eigen::Matrix<double, 6, 2> mixed = normal_.topRightCorner<6, 2>();
+  if (std::abs(light.determinant()) > 0) pose -= mixed * light.inverse() * mixed.transpose();
+  return pose;
+}
+
+void Aligner::Summarise(const EdgePoints& points, const geo::CameraIntrinsics& camera, double sigma,
+                        AlignmentResult& result) const {
   result.sigma = sigma;
   result.visible = current_.count;
   const auto k = static_cast<float>(config_.huber_k * sigma);
@@ -324,12 +373,7 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
     result.inliers += current_.visible[i] > 0 && std::abs(current_.value[i]) <= k ? 1U : 0U;
   }
   // Gain and bias are not known either: their part is taken out (Schur complement).
-  Matrix6d pose = normal_.topLeftCorner<6, 6>();
-  if (config_.estimate_illumination) {
-    const Eigen::Matrix2d light = normal_.bottomRightCorner<2, 2>();
-    const Eigen::Matrix<double, 6, 2> mixed = normal_.topRightCorner<6, 2>();
-    if (std::abs(light.determinant()) > 0) pose -= mixed * light.inverse() * mixed.transpose();
-  }
+  const Matrix6d pose = PoseInformation();
   const double square_gain = result.state.gain * result.state.gain;
   result.information = square_gain * pose;
   const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
@@ -342,6 +386,10 @@ void Aligner::Summarise(double sigma, AlignmentResult& result) const {
   const UpToEight whole = factors.solve(half.transpose());
   result.covariance =
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);
+  if (points.gradient_noise > 0) {
+    const SeenMovements seen(pose, NoiseInformation(points, camera, sigma));
+    result.covariance = seen.Widened(result.covariance, kUnseen);
+  }
 }
 
 }  // namespace livemap::odometry

@@ -39,7 +39,9 @@ struct AlignmentResult {
   /// residuals of variance 1 that are independent of each other.
   Matrix6d information = Matrix6d::Zero();
   /// Covariance of delta by how much parts of the image contradict each other: edge pixels that err
-  /// together, by a depth or by aliasing, count once, and exact ones err little.
+  /// together, by a depth or by aliasing, count once, and exact ones err little. Movements that no
+  /// edge shows, or only the noise of the gradients, have a variance of 100 square metres or
+  /// radians.
   Matrix6d covariance = Matrix6d::Zero();
   double sigma = 0;         ///< Robust standard deviation of the residuals, grey levels.
   double cost = 0;          ///< Mean robust cost, squared grey levels.
@@ -101,7 +103,13 @@ class Aligner {
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
   float PerSlope(const EdgePoints& points) const;
   void CountExplained(const EdgePoints& points, AlignmentResult& result) const;
-  void Summarise(double sigma, AlignmentResult& result) const;
+  /// What the noise of the gradients alone adds to the pose's part of the normal equations.
+  Matrix6d NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,
+                            double sigma) const;
+  /// The pose's part of the normal equations without what gain and bias could explain.
+  Matrix6d PoseInformation() const;
+  void Summarise(const EdgePoints& points, const geo::CameraIntrinsics& camera, double sigma,
+                 AlignmentResult& result) const;
 
   AlignmentConfig config_;
   Residuals current_, candidate_;

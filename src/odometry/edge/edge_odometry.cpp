@@ -274,11 +274,16 @@ double EdgeOdometry::SelectPointsOf(int level, Keyframe& keyframe) {
   const geo::CameraIntrinsics& camera = cameras_.camera[index];
   EdgePoints& points = keyframe.points[index];
   selector_.Select(reference, extractor_.Extract(grey), camera, selection, points);
-  const double covered = CoveredShare(points, camera);
-  if (covered >= kEnoughCovered) return covered;
-  selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
-  selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection, points);
-  return CoveredShare(points, camera);
+  double covered = CoveredShare(points, camera);
+  if (covered < kEnoughCovered) {
+    selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
+    selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection, points);
+    covered = CoveredShare(points, camera);
+  }
+  // Depths that are estimates err by more than the noise of the gradients hides.
+  const bool is_exact = points.inverse_depth_sigma.empty();
+  points.gradient_noise = is_exact ? keyframe.images.GradientNoise(level) : 0;
+  return covered;
 }
 
 const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
@@ -594,6 +599,9 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   // new_from_reference Exp(d) turned around is Exp(-d) reference_from_new: carried to the
   // right-hand side of the new pose by the adjoint.
   Matrix6d relative = config_.covariance_factor * fine.covariance;
+  if (keyframe_->finest_points().gradient_noise > 0) {
+    relative = WithinReach(relative, Seconds(stamp_ns - keyframe_->stamp_ns));
+  }
   if (attempt.ambiguous) {
     const Vector6d to_rival =
         Se3Log(fine.state.new_from_reference.inverse() * attempt.rival.state.new_from_reference);
@@ -628,6 +636,15 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.surfaces = attempt.surfaces;
   result.iterations = attempt.iterations;
   return result;
+}
+
+/// What no edge shows is not further away than a camera may move in that time.
+Matrix6d EdgeOdometry::WithinReach(const Matrix6d& covariance, double time_s) const {
+  Matrix6d reach = Matrix6d::Zero();
+  GrowWhileLost(config_, 0, time_s, reach);
+  const Eigen::LDLT<Matrix6d> sum(covariance + reach);
+  if (sum.info() != Eigen::Success) return covariance;
+  return covariance - covariance * sum.solve(covariance);
 }
 
 VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {

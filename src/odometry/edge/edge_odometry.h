@@ -218,6 +218,7 @@ class EdgeOdometry {
   void ReserveBuffers();
   void ForgetUsual();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
+  Matrix6d WithinReach(const Matrix6d& covariance, double time_s) const;
   VoResult Hold(std::int64_t stamp_ns);
 
   Config config_;

@@ -1,8 +1,10 @@
 #include "odometry/edge/image_pyramid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 
 namespace livemap::odometry {
@@ -88,6 +90,32 @@ void SmoothPyramidLevel(const cv::Mat& grey, std::vector<std::uint16_t>& across,
   }
 }
 
+/// Standard deviation of the noise of a grey image, by the median of what a mask that is blind to
+/// slopes leaves of it (Immerkaer 1996, with a median, which edges spoil less than a mean). Every
+/// fourth row and third column says enough.
+double NoiseOfPyramid(const cv::Mat& grey) {
+  constexpr double kOfMask = 6, kMedianToSigma = 0.6745;
+  std::array<std::uint32_t, 16 * 255 + 1> histogram{};
+  std::uint32_t count = 0;
+  for (int y = 1; y < grey.rows - 1; y += 4) {
+    const std::uint8_t *above = grey.ptr(y - 1), *here = grey.ptr(y), *below = grey.ptr(y + 1);
+    for (int x = 1; x < grey.cols - 1; x += 3, ++count) {
+      const int response = above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1] -
+                           2 * (above[x] + below[x] + here[x - 1] + here[x + 1]) + 4 * here[x];
+      ++histogram[static_cast<std::size_t>(std::abs(response))];
+    }
+  }
+  if (count == 0) return 0;
+  std::uint32_t seen = histogram[0];
+  std::size_t bin = 0;
+  // A mean of neighbours takes out the steps of whole numbers.
+  while (2 * seen < count) seen += histogram[++bin];
+  const double share =
+      histogram[bin] > 0 ? 1 - (static_cast<double>(seen) - 0.5 * count) / histogram[bin] : 0.5;
+  return (bin == 0 ? share * 0.5 : static_cast<double>(bin) - 0.5 + share) / kMedianToSigma /
+         kOfMask;
+}
+
 }  // namespace
 
 int CountLevels(cv::Size size) {
@@ -115,6 +143,14 @@ void ImagePyramid::Build(const cv::Mat& grey) {
     HalvePyramidLevel(images_[level - 1], images_[level]);
   }
   HalvePyramidLevel(images_[static_cast<std::size_t>(levels_ - 1)], thumbnail_);
+  // What the smoothing and the halving leave of white noise in a central difference, and what
+  // rounding to whole grey levels adds to it.
+  constexpr std::array<double, kMaxLevels> kLeft = {0.0586, 0.0489, 0.0206};
+  constexpr double kRounding = 1.0 / 24;
+  const double noise = NoiseOfPyramid(grey);
+  for (std::size_t level = 0; level < kLeft.size(); ++level) {
+    gradient_noise_[level] = kLeft[level] * noise * noise + kRounding;
+  }
 }
 
 void DepthPyramid::Build(const cv::Mat& depth, double units_per_m, Range range, int levels) {

@@ -30,10 +30,14 @@ class ImagePyramid {
   const cv::Mat& operator[](int level) const { return images_[static_cast<std::size_t>(level)]; }
   /// A small and smooth view of the whole image: 80x60 for 640x480.
   const cv::Mat& thumbnail() const { return thumbnail_; }
+  /// Variance of the central difference of a level's grey values, along either axis, that the
+  /// camera's noise and the rounding to whole grey levels alone make.
+  double GradientNoise(int level) const { return gradient_noise_[static_cast<std::size_t>(level)]; }
 
  private:
   int levels_ = 0;
   std::array<cv::Mat, kMaxLevels> images_;
+  std::array<double, kMaxLevels> gradient_noise_{};
   cv::Mat thumbnail_;
   std::vector<std::uint16_t> row_;
 };

@@ -106,6 +106,7 @@ void ForEachPointSet(const std::uint8_t* mask, int begin, int end, const Visit& 
 void EdgePoints::Clear() {
   for (auto* values : {&x, &y, &z, &intensity, &inverse_depth_sigma, &slope}) values->clear();
   for (auto& column : jacobian) column.clear();
+  gradient_noise = 0;
 }
 
 void EdgePoints::Reserve(std::size_t count) {

@@ -27,6 +27,9 @@ struct EdgePoints {
   /// Length of the reference's gradient there, grey levels per px.
   std::vector<float> slope;
   double mean_inverse_depth = 0;  ///< 1/m
+  /// Variance of the noise in each component of the gradients, squared grey levels per px; 0: not
+  /// known, every movement counts as seen.
+  double gradient_noise = 0;
 
   std::size_t size() const { return x.size(); }
   void Clear();

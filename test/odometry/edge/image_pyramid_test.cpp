@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <opencv2/core.hpp>
 
 namespace livemap::odometry {
 namespace {
@@ -53,6 +54,39 @@ TEST(DepthPyramid, NeitherHolesNorWhatIsBehindAnEdgeIsBlendedIn) {
   EXPECT_NEAR(pyramid[1].at<float>(0, 0), 1.01F, 1e-6) << "the hole does not count";
   EXPECT_EQ(pyramid[1].at<float>(0, 1), 1.0F) << "the nearer surface alone";
   EXPECT_EQ(pyramid[1].at<float>(0, 2), 0) << "unknown stays unknown";
+}
+
+/// Variance of the central differences along the rows.
+double VarianceOfDifferences(const cv::Mat& grey) {
+  const cv::Rect right(2, 0, grey.cols - 2, grey.rows), left(0, 0, grey.cols - 2, grey.rows);
+  cv::Mat differences, mean, deviation;
+  cv::subtract(grey(right), grey(left), differences, cv::noArray(), CV_32F);
+  cv::meanStdDev(0.5 * differences, mean, deviation);
+  return deviation.at<double>(0) * deviation.at<double>(0);
+}
+
+TEST(ImagePyramid, NoiseOfTheGradientsIsThatOfABareWall) {
+  cv::RNG random(5);
+  for (const double sigma : {1.0, 4.0, 12.0}) {
+    cv::Mat noise(480, 640, CV_16SC1), grey;
+    random.fill(noise, cv::RNG::NORMAL, 120, sigma);
+    noise.convertTo(grey, CV_8U);
+    ImagePyramid images;
+    images.Build(grey);
+    for (int level = 0; level < images.levels(); ++level) {
+      const double there_is = VarianceOfDifferences(images[level]);
+      EXPECT_NEAR(images.GradientNoise(level) / there_is, 1, 0.35) << sigma << ", level " << level;
+    }
+  }
+}
+
+TEST(ImagePyramid, StripesAndSlopesAreNoNoise) {
+  cv::Mat grey(480, 640, CV_8UC1);
+  for (int x = 0; x < grey.cols; ++x) grey.col(x).setTo(x / 8 % 2 == 0 ? 60 + x / 8 : 200 - x / 8);
+  ImagePyramid images;
+  images.Build(grey);
+  // Only the rounding to whole grey levels.
+  EXPECT_LT(images.GradientNoise(0), 0.1);
 }
 
 }  // namespace
