@@ -150,12 +150,12 @@ void PlaceBook::Save(std::int64_t now_ns) {
       }
     }
   }
+  // No place is in two changes. PostgreSQL takes rows at once that follow each other.
   for (const Change& change : changes) {
-    if (change.is_dropped) {
-      store_.DropPlace(change.vehicle_id, change.place.fix.stamp_ns);
-    } else {
-      store_.WritePlace(change.vehicle_id, change.place);
-    }
+    if (change.is_dropped) store_.DropPlace(change.vehicle_id, change.place.fix.stamp_ns);
+  }
+  for (const Change& change : changes) {
+    if (!change.is_dropped) store_.WritePlace(change.vehicle_id, change.place);
   }
 }
 

@@ -4,9 +4,9 @@
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <memory>
 #include <utility>
 
@@ -40,24 +40,23 @@ std::string PostgresqlSetting(soci::session& session, const std::string& name) {
   return value;
 }
 
-/// The text of a double that reads back as the same one.
-std::string TextOfNumber(double number) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), number);
-  return std::string(text.data(), end.ptr);
+/// With so many rows, or so much in one of its columns, a group takes no further row.
+constexpr int kMostRowsAtOnce = 1000;
+constexpr std::size_t kMostColumnBytes = 1 << 20;
+
+PostgresqlType TypeOfPlace(const BoundPlace& place) {
+  constexpr std::array kTypes{PostgresqlType::kText, PostgresqlType::kDouble,
+                              PostgresqlType::kInteger64, PostgresqlType::kInteger32};
+  return kTypes.at(place.value.index());
 }
 
-struct TextOfPlace {
-  std::string operator()(const std::string* text) const {
-    if (text->find('\0') != std::string::npos) {
-      throw StoreError("store: a text holds a zero byte, which PostgreSQL does not keep");
-    }
-    return *text;
+void AddPlace(const BoundPlace& place, PostgresqlColumn& column) {
+  if (place.indicator != nullptr && *place.indicator == soci::i_null) {
+    column.AddNull();
+  } else {
+    std::visit([&](const auto* value) { column.Add(*value); }, place.value);
   }
-  std::string operator()(const double* number) const { return TextOfNumber(*number); }
-  std::string operator()(const long long* number) const { return std::to_string(*number); }
-  std::string operator()(const int* number) const { return std::to_string(*number); }
-};
+}
 
 /// `:a, :b` as libpq writes it, `$1, $2`.
 std::string WithNumberedPlaces(const std::string& sql) {
@@ -72,6 +71,41 @@ std::string WithNumberedPlaces(const std::string& sql) {
     numbered += "$" + std::to_string(++count);
   }
   return numbered;
+}
+
+/// Where an INSERT's values stand, `VALUES (...)`: from its first to behind its last character.
+/// Empty where the statement is another one, or makes its values of more than places.
+std::pair<std::size_t, std::size_t> ValuesOfInsert(const std::string& sql) {
+  const std::size_t begin = sql.find("VALUES (");
+  if (sql.rfind("INSERT INTO ", 0) != 0 || begin == std::string::npos) return {};
+  std::size_t end = begin + std::string("VALUES (").size();
+  const auto is_of_places = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == ':' || c == ',' || c == ' ';
+  };
+  while (end < sql.size() && is_of_places(sql[end])) ++end;
+  if (end == sql.size() || sql[end] != ')') return {};
+  return {begin, end + 1};
+}
+
+/// The INSERT that takes an array for each place and inserts a row for each of their elements.
+std::string InsertOfRows(const std::string& sql, const std::vector<BoundPlace>& places) {
+  const auto [begin, end] = ValuesOfInsert(sql);
+  std::string rows = "SELECT * FROM unnest(";
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    rows += (i == 0 ? "CAST($" : ", CAST($") + std::to_string(i + 1) + " AS " +
+            NameOf(TypeOfPlace(places[i])) + "[])";
+  }
+  return sql.substr(0, begin) + rows + ")" + sql.substr(end);
+}
+
+/// How many columns the key of an `ON CONFLICT (...) DO UPDATE` has. PostgreSQL refuses rows of one
+/// statement that meet there.
+std::size_t ConflictColumns(const std::string& sql) {
+  const std::string mark = "ON CONFLICT (";
+  const std::size_t begin = sql.find(mark);
+  if (begin == std::string::npos || sql.find("DO UPDATE", begin) == std::string::npos) return 0;
+  const auto from = sql.begin() + static_cast<std::ptrdiff_t>(begin + mark.size());
+  return 1 + static_cast<std::size_t>(std::count(from, std::find(from, sql.end(), ')'), ','));
 }
 
 }  // namespace
@@ -161,11 +195,19 @@ std::string StoreConnection::SendQueued() {
   if (PQenterPipelineMode(connection) != 1) return PQerrorMessage(connection);
   std::string error;
   std::vector<const char*> values;
-  for (const QueuedWrite& write : queued_) {
+  std::vector<int> sizes;
+  std::vector<int> formats;
+  for (QueuedWrite& write : queued_) {
     values.clear();
-    for (const auto& value : write.values) values.push_back(value ? value->c_str() : nullptr);
+    sizes.clear();
+    for (PostgresqlColumn& column : write.columns) {
+      const auto sent = write.takes_rows ? column.Array() : column.Only();
+      values.push_back(sent.bytes);
+      sizes.push_back(sent.size);
+    }
+    formats.assign(values.size(), 1);  // All are binary.
     if (PQsendQueryPrepared(connection, write.statement, static_cast<int>(values.size()),
-                            values.data(), nullptr, nullptr, 0) != 1) {
+                            values.data(), sizes.data(), formats.data(), 0) != 1) {
       error = PQerrorMessage(connection);
       break;
     }
@@ -194,8 +236,17 @@ WriteStatement::WriteStatement(StoreConnection& connection, const std::string& s
   if (connection.is_postgresql()) {
     PGconn* server = ConnectionOf(connection.session_);
     name_ = connection.TakeNextName();
-    const PostgresqlResult result(PQprepare(server, name_.c_str(), WithNumberedPlaces(sql).c_str(),
-                                            static_cast<int>(places_.size()), nullptr));
+    takes_rows_ = ValuesOfInsert(sql).second != 0;
+    conflict_places_ = ConflictColumns(sql);
+    // What is not given as an array has the type in which it is sent.
+    std::vector<Oid> types(places_.size(), 0);
+    if (!takes_rows_) {
+      std::transform(places_.begin(), places_.end(), types.begin(),
+                     [](const BoundPlace& place) { return static_cast<Oid>(TypeOfPlace(place)); });
+    }
+    const std::string text = takes_rows_ ? InsertOfRows(sql, places_) : WithNumberedPlaces(sql);
+    const PostgresqlResult result(PQprepare(server, name_.c_str(), text.c_str(),
+                                            static_cast<int>(places_.size()), types.data()));
     if (PQresultStatus(result.get()) != PGRES_COMMAND_OK) {
       throw StoreError("store: preparing '" + sql + "' failed: " + PQerrorMessage(server));
     }
@@ -223,17 +274,36 @@ void WriteStatement::Execute() {
     statement_->execute(true);
     return;
   }
-  StoreConnection::QueuedWrite write{name_.c_str(), {}};
-  write.values.reserve(places_.size());
-  for (const BoundPlace& place : places_) {
-    const bool is_null = place.indicator != nullptr && *place.indicator == soci::i_null;
-    if (is_null) {
-      write.values.emplace_back();
-    } else {
-      write.values.emplace_back(std::visit(TextOfPlace{}, place.value));
+  Queue();
+}
+
+/// Beside the row before, where that is of this statement and PostgreSQL takes both at once.
+void WriteStatement::Queue() {
+  auto& queued = connection_.queued_;
+  std::string conflict;
+  if (conflict_places_ > 0) {
+    std::vector<PostgresqlColumn> key;
+    for (std::size_t i = 0; i < conflict_places_; ++i) {
+      AddPlace(places_[i], key.emplace_back(TypeOfPlace(places_[i])));
+      conflict += key.back().elements();
     }
   }
-  connection_.queued_.push_back(std::move(write));
+  const bool joins =
+      takes_rows_ && !queued.empty() && queued.back().statement == name_.c_str() &&
+      queued.back().conflicts.count(conflict) == 0 &&
+      std::all_of(queued.back().columns.begin(), queued.back().columns.end(),
+                  [](const auto& column) {
+                    return column.rows() < kMostRowsAtOnce && column.bytes() < kMostColumnBytes;
+                  });
+  if (!joins) {
+    auto& write = queued.emplace_back();
+    write.statement = name_.c_str();
+    write.takes_rows = takes_rows_;
+    for (const BoundPlace& place : places_) write.columns.emplace_back(TypeOfPlace(place));
+  }
+  StoreConnection::QueuedWrite& write = queued.back();
+  for (std::size_t i = 0; i < places_.size(); ++i) AddPlace(places_[i], write.columns[i]);
+  if (conflict_places_ > 0) write.conflicts.insert(std::move(conflict));
 }
 
 }  // namespace livemap::zone

@@ -7,10 +7,12 @@
 #include <initializer_list>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <variant>
 #include <vector>
 
 #include "zone/store/dialect.h"
+#include "zone/store/postgresql_column.h"
 
 namespace livemap::zone {
 
@@ -30,8 +32,9 @@ struct BoundPlace {
 /// A connection to the zone's database, SQLite's or PostgreSQL's. Not thread-safe.
 ///
 /// What WriteStatement writes to PostgreSQL is sent at once for many rows: it is queued until
-/// something else is asked of the connection, and its errors are thrown there. Everything that
-/// reads goes through session(), or calls Flush first.
+/// something else is asked of the connection, and its errors are thrown there. Rows that one
+/// statement inserts one after the other become one statement of many rows. Everything that reads
+/// goes through session(), or calls Flush first.
 class StoreConnection {
  public:
   enum class Use { kWrite, kRead };
@@ -66,7 +69,9 @@ class StoreConnection {
   friend class WriteStatement;
   struct QueuedWrite {
     const char* statement;  ///< The name of a prepared one, which outlives the queue.
-    std::vector<std::optional<std::string>> values;
+    bool takes_rows;
+    std::vector<PostgresqlColumn> columns;      ///< One for each place.
+    std::unordered_set<std::string> conflicts;  ///< What the rows have where a key may be there.
   };
 
   void SetUpSqlite(const std::string& path, Use use);
@@ -82,7 +87,8 @@ class StoreConnection {
 };
 
 /// A statement that returns no rows, made ready once and run often. Its text has a name with a
-/// colon before it for each place, in their order.
+/// colon before it for each place, in their order. The columns of an ON CONFLICT are the first that
+/// an INSERT names.
 class WriteStatement {
  public:
   /// Keeps the connection and the places. Throws soci_error.
@@ -95,10 +101,15 @@ class WriteStatement {
   void Execute();
 
  private:
+  void Queue();
+
   StoreConnection& connection_;
   std::vector<BoundPlace> places_;
   std::optional<soci::statement> statement_;  ///< Of SQLite.
-  std::string name_;                          ///< Of PostgreSQL.
+  // Of PostgreSQL.
+  std::string name_;
+  bool takes_rows_ = false;
+  std::size_t conflict_places_ = 0;  ///< So many of the first places are the key of an ON CONFLICT.
 };
 
 /// Why a database is not usable as it is, in the words that operators look for.
