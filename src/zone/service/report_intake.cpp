@@ -44,9 +44,14 @@ ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& r
   Batch batch;
   batch.reports = &reports;
   batch.receipts.resize(reports.size());
+  std::vector<Uuid> uuids;
+  uuids.reserve(reports.size());
+  for (const protocol::Report& report : reports) uuids.push_back(report.uuid);
+  // All at once: each question to a server costs as much as many answers.
+  const auto known = state_.store.FindReports(uuids);
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const protocol::Report& report = reports[i];
-    if (!MayChangeMap(i, now_ns, batch)) continue;
+    if (!MayChangeMap(i, known[i], now_ns, batch)) continue;
     PendingReport pending{i, {}, {}};
     PictureCost& asked = batch.asked[report.vehicle_id];
     // A report counts without a picture that is not kept.
@@ -67,10 +72,11 @@ ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& r
 }
 
 /// The reports that may not are counted, and answered unless they are to be sent again.
-bool ReportIntake::MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& batch) {
+bool ReportIntake::MayChangeMap(std::size_t index,
+                                const std::optional<ZoneStore::KnownReport>& known,
+                                std::int64_t now_ns, Batch& batch) {
   const protocol::Report& report = (*batch.reports)[index];
   // A report that was committed stays committed, whatever the limits are now.
-  const auto known = state_.store.FindReport(report.uuid);
   if (known && known->vehicle_id == report.vehicle_id) {
     batch.receipts[index] = Committed(report, known->hazard);
     ++batch.counted.repeated;

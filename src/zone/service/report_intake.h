@@ -21,6 +21,7 @@
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
 #include "zone/service/zone_transaction.h"
+#include "zone/store/zone_store.h"
 
 namespace livemap::zone {
 
@@ -69,7 +70,8 @@ class ReportIntake {
  private:
   using Slot = HazardRegistry::Slot;
 
-  bool MayChangeMap(std::size_t index, std::int64_t now_ns, Batch& batch);
+  bool MayChangeMap(std::size_t index, const std::optional<ZoneStore::KnownReport>& known,
+                    std::int64_t now_ns, Batch& batch);
   std::optional<Refusal> WhyNoNewHazard(const protocol::Report& report, std::int64_t now_ns) const;
   static void Refuse(const Refusal& refusal, std::size_t index, Batch& batch);
   void ApplyOne(const PendingReport& pending, Batch& batch, ZoneTransaction& transaction);

@@ -6,16 +6,35 @@
 #include "zone/store/queries.h"
 
 namespace livemap::zone {
+namespace {
+
+constexpr std::size_t kMostAskedReports = 1000;
+
+/// Of each uuid in :asked that a report has, its number there from 1, the report's hazard, and its
+/// vehicle. SQLite is asked for one uuid at a time, PostgreSQL for an array of them. A report whose
+/// hazard is broken is known all the same: its uuid is taken.
+std::string FindReportsStatement(const StoreConnection& connection) {
+  const Dialect& dialect = connection.dialect();
+  const std::string what = dialect.TextOrEmpty("h.uuid", 37) + " AS hazard_uuid, " +
+                           dialect.TextOrEmpty("r.vehicle_id", 65) +
+                           " AS vehicle_id FROM reports r LEFT JOIN hazards h ON h.id = "
+                           "r.hazard_id WHERE r.uuid = ";
+  if (!connection.is_postgresql()) return "SELECT 1, " + what + ":asked";
+  // The limit keeps the server from a plan that reads the whole table, whatever it believes to know
+  // of a table that is new to it.
+  return "SELECT asked.number, known.hazard_uuid, known.vehicle_id FROM "
+         "unnest(CAST(:asked AS text[])) WITH ORDINALITY AS asked (uuid, number) "
+         "CROSS JOIN LATERAL (SELECT " +
+         what + "asked.uuid LIMIT 1) AS known";
+}
+
+}  // namespace
+
 ReportLog::ReportLog(StoreConnection& connection)
     : connection_(connection),
-      // A report whose hazard is broken is known all the same: its uuid is taken.
-      find_report_((connection.session().prepare
-                        << "SELECT " << connection.dialect().TextOrEmpty("h.uuid", 37) << ", "
-                        << connection.dialect().TextOrEmpty("r.vehicle_id", 65)
-                        << " FROM reports r LEFT JOIN "
-                           "hazards h ON h.id = r.hazard_id WHERE r.uuid = :uuid",
-                    soci::use(row_.uuid), soci::into(row_.hazard_uuid),
-                    soci::into(row_.vehicle_id))),
+      find_reports_((connection.session().prepare << FindReportsStatement(connection),
+                     soci::use(row_.asked), soci::into(row_.number), soci::into(row_.hazard_uuid),
+                     soci::into(row_.vehicle_id))),
       write_report_(
           connection,
           "INSERT INTO reports (uuid, hazard_id, vehicle_id, drive_id, stamp_ns, "
@@ -38,11 +57,27 @@ ReportLog::ReportLog(StoreConnection& connection)
                     {row_.uuid, row_.hazard_id, row_.vehicle_id, row_.answer, row_.reason,
                      row_.confidence, row_.stamp_ns, row_.received_ns}) {}
 
-std::optional<ZoneStore::KnownReport> ReportLog::FindReport(const Uuid& report_uuid) {
-  return ExplainStore("looking up a report", [&]() -> std::optional<ZoneStore::KnownReport> {
-    row_.uuid = report_uuid.ToString();
-    if (!FetchOne(connection_, find_report_)) return std::nullopt;
-    return ZoneStore::KnownReport{Uuid::Parse(row_.hazard_uuid).value_or(Uuid{}), row_.vehicle_id};
+std::vector<std::optional<ZoneStore::KnownReport>> ReportLog::FindReports(
+    const std::vector<Uuid>& reports) {
+  return ExplainStore("looking up reports", [&] {
+    std::vector<std::optional<ZoneStore::KnownReport>> known(reports.size());
+    const std::size_t at_once = connection_.is_postgresql() ? kMostAskedReports : 1;
+    for (std::size_t begin = 0; begin < reports.size(); begin += at_once) {
+      const std::size_t end = std::min(reports.size(), begin + at_once);
+      row_.asked = connection_.is_postgresql() ? "{" : "";
+      for (std::size_t i = begin; i < end; ++i) {
+        if (i > begin) row_.asked += ',';
+        row_.asked += reports[i].ToString();
+      }
+      if (connection_.is_postgresql()) row_.asked += '}';
+      connection_.Run(find_reports_);
+      while (find_reports_.fetch()) {
+        if (row_.number < 1 || row_.number > static_cast<long long>(end - begin)) continue;
+        known[begin + static_cast<std::size_t>(row_.number) - 1] =
+            ZoneStore::KnownReport{Uuid::Parse(row_.hazard_uuid).value_or(Uuid{}), row_.vehicle_id};
+      }
+    }
+    return known;
   });
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "zone/store/store_connection.h"
 #include "zone/store/zone_store.h"
@@ -21,7 +22,7 @@ class ReportLog {
   ReportLog& operator=(const ReportLog&) = delete;
 
   /// See the functions of ZoneStore with these names.
-  std::optional<ZoneStore::KnownReport> FindReport(const Uuid& report_uuid);
+  std::vector<std::optional<ZoneStore::KnownReport>> FindReports(const std::vector<Uuid>& reports);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
   void WriteAnswer(const protocol::PollAnswer& answer, std::uint64_t hazard_id,
@@ -30,11 +31,11 @@ class ReportLog {
  private:
   /// SOCI binds to places, not to values.
   struct Row {
-    std::string uuid, hazard_uuid, vehicle_id, drive_id, image_sha256, reason;
+    std::string asked, uuid, hazard_uuid, vehicle_id, drive_id, image_sha256, reason;
     double confidence = 0, latitude = 0, longitude = 0;
     double covariance_ee = 0, covariance_en = 0, covariance_nn = 0;
     double box_left = 0, box_top = 0, box_right = 0, box_bottom = 0;
-    long long hazard_id = 0, stamp_ns = 0, received_ns = 0;
+    long long number = 0, hazard_id = 0, stamp_ns = 0, received_ns = 0;
     int answer = 0;
   };
 
@@ -42,7 +43,7 @@ class ReportLog {
 
   StoreConnection& connection_;
   Row row_;
-  soci::statement find_report_;
+  soci::statement find_reports_;
   WriteStatement write_report_;
   WriteStatement write_box_;
   WriteStatement write_answer_;

@@ -351,9 +351,9 @@ std::uint64_t ZoneStore::LastSequence() {
   });
 }
 
-std::optional<ZoneStore::KnownReport> ZoneStore::FindReport(const Uuid& report_uuid) {
-  return implementation_->Read(
-      [&](auto& writer) { return writer.reports.FindReport(report_uuid); });
+std::vector<std::optional<ZoneStore::KnownReport>> ZoneStore::FindReports(
+    const std::vector<Uuid>& reports) {
+  return implementation_->Read([&](auto& writer) { return writer.reports.FindReports(reports); });
 }
 
 std::vector<StoredEvent> ZoneStore::LoadEvents(const Uuid& hazard, std::uint64_t sequence,

@@ -91,8 +91,8 @@ class ZoneStore {
     Uuid hazard;  ///< What it became or was merged into; nil when its hazard's row is broken.
     std::string vehicle_id;
   };
-  /// A committed report.
-  std::optional<KnownReport> FindReport(const Uuid& report_uuid);
+  /// Which of these reports are committed, in their order.
+  std::vector<std::optional<KnownReport>> FindReports(const std::vector<Uuid>& reports);
   /// Where vehicles were (PlaceBook): every sound row, of no vehicle twice at one stamp; those of
   /// one vehicle follow each other, the newest first.
   StoreDamage LoadPlaces(const std::function<void(const std::string&, KnownPlace)>& take);

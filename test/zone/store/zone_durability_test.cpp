@@ -100,7 +100,7 @@ TEST_F(ZoneDurabilityTest, NothingCommittedIsLostOrDoubledWhenTheProcessIsKilled
     ASSERT_TRUE(WIFSIGNALED(status));
 
     ZoneStore store(Database());
-    for (const Uuid& committed : uuids) EXPECT_TRUE(store.FindReport(committed));
+    for (const auto& committed : store.FindReports(uuids)) EXPECT_TRUE(committed);
     acknowledged += uuids.size();
     StoreProbe probe = Probe();
     const double reports = probe.Number("SELECT count(*) FROM reports");
