@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -17,12 +18,15 @@
 #include "test/zone/zone_fixture.h"
 #include "zone/service/zone_service.h"
 #include "zone/store/postgresql_url.h"
+#include "zone/store/zone_store.h"
 
 namespace livemap::zone {
 namespace {
 
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Pair;
 
 class PostgresqlStoreTest : public PostgresqlZoneTest {
  protected:
@@ -120,6 +124,66 @@ TEST_F(PostgresqlStoreTest, NothingCommittedIsLostOrDoubledWhenTheServerIsKilled
     EXPECT_EQ(zone.Handle(report).status, protocol::Receipt::Status::kCommitted);
   }
   EXPECT_EQ(zone.Statistics().repeated, reports.size()) << "each was there, once";
+}
+
+TEST_F(PostgresqlStoreTest, OfTwoRowsOfOneKeyInOneTransactionTheLaterStays) {
+  ZoneStore store(url_);
+  store.Begin();
+  for (int round = 1; round <= 3; ++round) {
+    for (const std::uint64_t vehicle : {1U, 2U}) {
+      TrustRecord record;
+      record.suspicion = round + 0.125 * static_cast<double>(vehicle);
+      record.at_ns = kNowNs;
+      store.WriteTrust(vehicle, record);
+    }
+  }
+  store.Commit();
+  std::map<std::uint64_t, double> suspicions;
+  store.LoadTrust([&](std::uint64_t vehicle, const TrustRecord& record) {
+    suspicions[vehicle] = record.suspicion;
+  });
+  EXPECT_THAT(suspicions, ElementsAre(Pair(1, 3.125), Pair(2, 3.25)));
+}
+
+TEST_F(PostgresqlStoreTest, ManyRowsOfOneTransactionAreThereAsTheyWereWritten) {
+  ZoneStore store(url_);
+  std::vector<protocol::Report> reports;
+  std::vector<Uuid> asked;
+  store.Begin();
+  for (int i = 0; i < 2500; ++i) {
+    reports.push_back(MakeReport({40 + 0.1 * i / 3, -80}));
+    // What would end an array or a string of SQL.
+    reports.back().vehicle_id = "{\"car\\',NULL}" + std::to_string(i);
+    store.WriteReport(reports.back(), static_cast<std::uint64_t>(i) + 1, "", kNowNs);
+    asked.push_back(reports.back().uuid);
+    asked.push_back(MakeReport().uuid);
+  }
+  store.Commit();
+  const auto known = store.FindReports(asked);
+  ASSERT_EQ(known.size(), asked.size());
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    ASSERT_TRUE(known[2 * i]);
+    EXPECT_EQ(known[2 * i]->vehicle_id, reports[i].vehicle_id);
+    EXPECT_FALSE(known[2 * i + 1]) << "nobody told it";
+  }
+  StoreProbe probe(url_);
+  EXPECT_EQ(probe.Number("SELECT latitude FROM reports WHERE hazard_id = 2001"),
+            reports[2000].position.latitude_deg);
+  EXPECT_EQ(probe.Number("SELECT count(*) FROM reports WHERE rowid = hazard_id"), 2500)
+      << "rows are counted in their order";
+}
+
+TEST_F(PostgresqlStoreTest, AZeroByteInATextIsRefusedAndNothingOfItsTransactionIsKept) {
+  ZoneStore store(url_);
+  store.Begin();
+  store.WriteTrust(1, {});
+  protocol::Report report = MakeReport();
+  report.drive_id = std::string("drive\0-1", 8);
+  EXPECT_THROW(store.WriteReport(report, 1, "", kNowNs), StoreError);
+  store.Rollback();
+  StoreProbe probe(url_);
+  EXPECT_EQ(probe.Number("SELECT count(*) FROM trust"), 0);
+  EXPECT_EQ(probe.Number("SELECT count(*) FROM reports"), 0);
 }
 
 TEST_F(PostgresqlStoreTest, AHistoryIsReadAgainAfterTheServerWasKilled) {
