@@ -22,12 +22,12 @@ constexpr std::size_t kItemsPerRead = 128;
 /// Answers with what the zone knows, of hazards or of map changes, as a GeoJSON FeatureCollection
 /// of at most `limit` Features, one read at a time. `walk.until` is the zone's sequence before the
 /// first read: what changes while the answer is written has a newer one and is told to whoever asks
-/// for what came since. `read(walk, limit)` gives the next zone::Page, `to_feature` makes an item's
-/// Feature.
+/// for what came since, `log` names the sequence (zone::MapReader::LogId). `read(walk, limit)`
+/// gives the next zone::Page, `to_feature` makes an item's Feature.
 template <typename State, typename Read, typename ToFeature>
-HttpResponse ListAnswer(zone::Walk<State> walk, std::size_t limit, Read read,
+HttpResponse ListAnswer(zone::Walk<State> walk, std::size_t limit, const Uuid& log, Read read,
                         ToFeature to_feature) {
-  auto pieces = [walk = std::move(walk), left = limit, read = std::move(read),
+  auto pieces = [walk = std::move(walk), left = limit, log, read = std::move(read),
                  to_feature = std::move(to_feature), is_begun = false,
                  has_items = false](std::string& piece) mutable {
     if (!is_begun) piece += R"({"type":"FeatureCollection","features":[)";
@@ -45,7 +45,7 @@ HttpResponse ListAnswer(zone::Walk<State> walk, std::size_t limit, Read read,
     // A cut list is complete up to its last item.
     const std::uint64_t sequence = is_truncated ? page.items.back().sequence : walk.until;
     piece += R"(],"sequence":)" + std::to_string(sequence) + R"(,"truncated":)" +
-             (is_truncated ? "true}" : "false}");
+             (is_truncated ? "true" : "false") + R"(,"log":")" + log.ToString() + "\"}";
     return false;
   };
   return PiecesAnswer(std::move(pieces), "application/geo+json");

@@ -7,7 +7,7 @@
 
 namespace livemap::web {
 
-EventHub::EventHub(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
+EventHub::EventHub(zone::MapReader& zone, const protocol::HazardCatalogue& catalogue,
                    VehicleTrails& trails)
     : zone_(zone), catalogue_(catalogue), trails_(trails) {
   subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { Publish(event); });

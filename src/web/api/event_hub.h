@@ -8,7 +8,7 @@
 #include "common/mutex.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/api/vehicle_trails.h"
-#include "zone/service/zone_service.h"
+#include "zone/service/map_reader.h"
 
 namespace livemap::web {
 
@@ -31,7 +31,7 @@ class LiveListener {
 class EventHub {
  public:
   /// Subscribes to the zone; keeps references.
-  EventHub(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
+  EventHub(zone::MapReader& zone, const protocol::HazardCatalogue& catalogue,
            VehicleTrails& trails);
   ~EventHub();
   EventHub(const EventHub&) = delete;
@@ -47,7 +47,7 @@ class EventHub {
  private:
   void Publish(const zone::ZoneEvent& event);
 
-  zone::ZoneService& zone_;
+  zone::MapReader& zone_;
   const protocol::HazardCatalogue& catalogue_;
   VehicleTrails& trails_;
   Mutex mutex_;

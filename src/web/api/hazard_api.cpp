@@ -136,7 +136,7 @@ HttpResponse HazardApi::List(HazardQuery query, bool all) const {
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(hazard, query));
     return feature;
   };
-  return ListAnswer(std::move(walk), query.limit, read, to_feature);
+  return ListAnswer(std::move(walk), query.limit, zone_.LogId(), read, to_feature);
 }
 
 HttpResponse HazardApi::Points(PointsQuery query, bool all) const {

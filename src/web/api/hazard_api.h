@@ -5,7 +5,7 @@
 #include "protocol/hazard_catalogue.h"
 #include "web/api/query.h"
 #include "web/http/http_message.h"
-#include "zone/service/zone_service.h"
+#include "zone/service/map_reader.h"
 
 namespace livemap::web {
 
@@ -17,7 +17,7 @@ constexpr const char* kHazardAddress = "/api/v1/hazards";
 class HazardApi {
  public:
   /// Keeps the references.
-  HazardApi(zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue)
+  HazardApi(const zone::MapReader& zone, const protocol::HazardCatalogue& catalogue)
       : zone_(zone), catalogue_(catalogue) {}
 
   /// `target.path` starts with kHazardAddress and is no decision's. Without `all` only of hazards
@@ -30,7 +30,7 @@ class HazardApi {
   HttpResponse One(const std::string& id, bool all) const;
   HttpResponse Events(const std::string& id, std::size_t limit) const;
 
-  zone::ZoneService& zone_;
+  const zone::MapReader& zone_;
   const protocol::HazardCatalogue& catalogue_;
 };
 

@@ -52,7 +52,7 @@ HttpResponse MapChangeApi::List(const MapChangeQuery& query) const {
     if (query.since) feature["properties"]["action"] = ActionName(ActionFor(change, query));
     return feature;
   };
-  return ListAnswer(std::move(walk), query.limit, read, to_feature);
+  return ListAnswer(std::move(walk), query.limit, zone_.LogId(), read, to_feature);
 }
 
 HttpResponse MapChangeApi::One(const std::string& id) const {

@@ -6,14 +6,14 @@
 #include "common/clock.h"
 #include "protocol/hazard_catalogue.h"
 #include "web/http/web_config.h"
-#include "zone/service/zone_service.h"
+#include "zone/service/map_reader.h"
 
 namespace livemap::web {
 
 /// What answers to other systems are made of. The references outlive it.
 struct FeedSource {
   const WebConfig& options;
-  zone::ZoneService& zone;
+  const zone::MapReader& zone;
   const protocol::HazardCatalogue& catalogue;
   std::function<std::int64_t()> now_ns = SystemNs;  ///< UTC, ns since 1970.
 };

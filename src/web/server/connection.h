@@ -20,7 +20,7 @@ namespace livemap::web {
 
 /// What the live stream tells.
 struct LiveSource {
-  zone::ZoneService& zone;
+  zone::MapReader& zone;
   const protocol::HazardCatalogue& catalogue;
   EventHub& hub;
 };

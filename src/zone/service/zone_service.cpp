@@ -32,11 +32,18 @@ PlaceBook::Config PlaceRules(const ZoneConfig& config) {
   return {config.speed, config.limits, config.max_vehicles};
 }
 
+/// Never by the seed: a test that replays a run is another start, too.
+Uuid NewLogId() {
+  auto generator = EntropySeededGenerator();
+  return Uuid::Random(generator);
+}
+
 }  // namespace
 
 ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
     : config_(CheckedConfig(std::move(config))),
       now_ns_(std::move(now_ns)),
+      log_id_(NewLogId()),
       directory_(config_.directory),
       state_(config_, directory_.path(), uuid_seed),
       images_(directory_.path() + "/images", static_cast<std::uint64_t>(config_.image_cap_bytes)),

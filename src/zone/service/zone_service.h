@@ -36,6 +36,7 @@
 #include "zone/service/hazard_desk.h"
 #include "zone/service/hazard_steps.h"
 #include "zone/service/map_change_intake.h"
+#include "zone/service/map_reader.h"
 #include "zone/service/official_actions.h"
 #include "zone/service/poll_coordinator.h"
 #include "zone/service/report_intake.h"
@@ -53,20 +54,17 @@ namespace livemap::zone {
 /// the database with synchronous=FULL; a report's uuid counts once, also across restarts; a reader
 /// never sees what is not committed; events reach subscribers after their commit, in the order of
 /// their sequence.
-class ZoneService {
+class ZoneService : public MapReader {
  public:
   using Config = ZoneConfig;
   using Clock = std::function<std::int64_t()>;  ///< UTC, ns since 1970.
-  using Subscriber = EventStream::Subscriber;
 
   /// Opens or makes the store and loads it; rows of impossible values are left out, left alone and
   /// counted. `uuid_seed` seeds the ids of new hazards: a test gives
   /// a number, a node gives entropy. Throws Error for a bad setting, StoreError for a store that
   /// cannot be used: not writable, corrupt, or of a newer schema.
   ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed);
-  ~ZoneService();
-  ZoneService(const ZoneService&) = delete;
-  ZoneService& operator=(const ZoneService&) = delete;
+  ~ZoneService() override;
 
   /// Validates, registers or merges, commits; idempotent by uuid. Throws StoreError when the store
   /// fails: then nothing of the report counts, and the vehicle sends it again. Throws Error when
@@ -90,8 +88,9 @@ class ZoneService {
   /// The next page, of at most `limit`, of a walk over the map changes. Whoever walks until
   /// Sequence() as it was at the start is told each map change once; those that change meanwhile
   /// may be left out and have a newer sequence.
-  Page<MapChangeFeature> ReadMapChanges(const Walk<MapChangeState>& walk, std::size_t limit) const;
-  std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const;
+  Page<MapChangeFeature> ReadMapChanges(const Walk<MapChangeState>& walk,
+                                        std::size_t limit) const override;
+  std::optional<MapChangeFeature> FindMapChange(const Uuid& uuid) const override;
   /// As Events.
   std::vector<StoredMapChangeEvent> MapChangeEvents(const Uuid& uuid, std::size_t limit) const;
   /// An official's decisions, as Confirm and Reject below. None when there is no such feature, or
@@ -107,9 +106,9 @@ class ZoneService {
   std::vector<Hazard> Query(const std::optional<geo::GeoBox>& box, std::uint64_t since_sequence,
                             std::size_t limit, const HazardStates& states = {}) const;
   /// As ReadMapChanges.
-  Page<Hazard> ReadHazards(const Walk<HazardState>& walk, std::size_t limit) const;
+  Page<Hazard> ReadHazards(const Walk<HazardState>& walk, std::size_t limit) const override;
   /// How many hazards are in each state, by HazardState.
-  std::array<std::size_t, kHazardStates> HazardCounts() const;
+  std::array<std::size_t, kHazardStates> HazardCounts() const override;
   /// Hazards that drivers are told of within `radius_m` of `centre`, nearest first, at most
   /// `limit`.
   std::vector<Hazard> QueryNear(const geo::GeoPoint& centre, double radius_m,
@@ -122,12 +121,12 @@ class ZoneService {
                                     std::uint64_t since_sequence, std::size_t limit) const;
   /// What a map shows that is opened: the zone's bounds where they are set, else where most hazards
   /// are (ViewOf); none while there is nothing. It may be a little old (SharedView).
-  std::optional<geo::GeoBox> View() const;
+  std::optional<geo::GeoBox> View() const override;
   /// Also one that is gone or rejected.
-  std::optional<Hazard> Find(const Uuid& uuid) const;
+  std::optional<Hazard> Find(const Uuid& uuid) const override;
   /// The newest `limit` events of a hazard, oldest of them first; empty for an unknown one. Throws
   /// StoreError. Waits for no writer, unless one commits just now.
-  std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const;
+  std::vector<StoredEvent> Events(const Uuid& hazard, std::size_t limit) const override;
 
   /// The audit trail: the newest `limit` decisions of all officials whose id is below `before`, the
   /// newest first. Throws StoreError. Waits for no writer, unless one commits just now.
@@ -252,17 +251,18 @@ class ZoneService {
   /// Vehicles heard of within the retention time, by id.
   std::vector<VehicleState> Vehicles() const;
   /// The first `limit` of them whose id comes after `id`.
-  std::vector<VehicleState> VehiclesAfter(const std::string& id, std::size_t limit) const;
+  std::vector<VehicleState> VehiclesAfter(const std::string& id, std::size_t limit) const override;
 
   /// `subscriber` is called from whichever thread commits, one call at a time. It may read from
   /// this service but must neither write to it nor (un)subscribe.
-  int Subscribe(Subscriber subscriber);
+  int Subscribe(Subscriber subscriber) override;
   /// When this returns the subscriber is not running and will not be called again.
-  void Unsubscribe(int id);
+  void Unsubscribe(int id) override;
 
   /// Of the newest committed event; 0 when nothing ever happened. Waits for nothing, not for the
   /// disk either.
-  std::uint64_t Sequence() const { return sequence_; }
+  std::uint64_t Sequence() const override { return sequence_; }
+  Uuid LogId() const override { return log_id_; }
   /// Of the newest event that drivers were told; 0 without one. As Sequence.
   std::uint64_t AnnouncedSequence() const { return announced_; }
   ZoneStatistics Statistics() const;
@@ -278,10 +278,10 @@ class ZoneService {
   /// back (ZoneConfig::replay).
   DurationHistogram::Counts report_ages() const { return report_ages_.counts(); }
   /// The streets that the zone knows; null: none. They do not change.
-  const streets::StreetMap* streets() const { return config_.streets.get(); }
+  const streets::StreetMap* streets() const override { return config_.streets.get(); }
   /// Where on them the hazard lies; nothing but a note where the zone knows none. Quick, any
   /// thread.
-  streets::StreetWords WordsOf(const Hazard& hazard) const;
+  streets::StreetWords WordsOf(const Hazard& hazard) const override;
 
  private:
   using Slot = HazardRegistry::Slot;
@@ -326,6 +326,7 @@ class ZoneService {
 
   const ZoneConfig config_;
   const Clock now_ns_;
+  const Uuid log_id_;
   const OwnedDirectory directory_;
 
   // Locks are taken in the order writer_mutex_, data_mutex_, then those that parts own: of the

@@ -24,7 +24,7 @@ TEST(ListAnswer, ReadsOnceAtATimeAlsoWhereNothingMatches) {
     return page;
   };
   const HttpResponse answer =
-      ListAnswer(walk, 100, read, [](const zone::Hazard&) { return Json::object(); });
+      ListAnswer(walk, 100, Uuid{}, read, [](const zone::Hazard&) { return Json::object(); });
   std::string piece;
   for (int i = 1; i < 5; ++i) {
     ASSERT_TRUE(answer.pieces(piece));
