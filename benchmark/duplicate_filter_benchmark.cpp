@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "protocol/duplicate_filter.h"
 #include "run_benchmarks.h"
-#include "vehicle/reporting/duplicate_filter.h"
 
 namespace livemap::bench {
 namespace {
@@ -48,7 +48,7 @@ struct World {
     }
   }
 
-  vehicle::DuplicateFilter filter;
+  protocol::DuplicateFilter filter;
   std::vector<geo::GeoPoint> anywhere;  // Mostly new.
   std::vector<geo::GeoPoint> at_known;  // All known.
 };

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "common/uuid.h"
+#include "protocol/cross_zone_duplicates.h"
 #include "protocol/hazard_catalogue.h"
 #include "protocol/notice.h"
-#include "vehicle/alerts/cross_zone_duplicates.h"
 #include "vehicle/alerts/driver_alerts.h"
 
 namespace livemap::vehicle {
@@ -40,11 +40,12 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path);
 /// The hazards that zones have announced: by their notices as they come, and by the vehicle's local
 /// map, which knows what came before the start and is told again what was missed. The newer word
 /// of the hazard's zone counts, by its sequence; another zone's word about it does not. What two
-/// zones announce at one place is there for the driver once (CrossZoneDuplicates). Not thread-safe.
+/// zones announce at one place is there for the driver once (protocol::CrossZoneDuplicates). Not
+/// thread-safe.
 class AnnouncedHazards {
  public:
   /// What changes for the driver.
-  using Changes = CrossZoneDuplicates::Changes;
+  using Changes = protocol::CrossZoneDuplicates<AlertHazard>::Changes;
 
   /// `catalogue` says how near two hazards of a class are one.
   explicit AnnouncedHazards(protocol::HazardCatalogue catalogue = {})
@@ -76,7 +77,7 @@ class AnnouncedHazards {
   std::unordered_map<Uuid, Word> there_;
   std::unordered_map<Uuid, Word> gone_;  // Removed since the start.
   std::map<std::string, std::uint64_t> stored_sequences_;
-  CrossZoneDuplicates duplicates_;
+  protocol::CrossZoneDuplicates<AlertHazard> duplicates_;
   std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
   std::uint64_t beyond_zone_ = 0;
 };

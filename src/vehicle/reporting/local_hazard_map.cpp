@@ -125,7 +125,7 @@ void LocalHazardMap::RecoverFromSetAside() {
 }
 
 void LocalHazardMap::LoadFilter() {
-  filter_ = DuplicateFilter(catalogue_);
+  filter_ = protocol::DuplicateFilter(catalogue_);
   SqliteStatement rows = database_->Prepare("SELECT id,class_name,latitude,longitude FROM known");
   while (rows.Step()) {
     filter_.Put(UuidFromBlob(rows.Blob(0)), rows.Text(1), {rows.Real(2), rows.Real(3)});
@@ -150,8 +150,8 @@ void LocalHazardMap::CountPending() {
   }
 }
 
-std::optional<DuplicateFilter::Match> LocalHazardMap::Find(const std::string& class_name,
-                                                           const geo::GeoPoint& position) const {
+std::optional<protocol::DuplicateFilter::Match> LocalHazardMap::Find(
+    const std::string& class_name, const geo::GeoPoint& position) const {
   return filter_.Find(class_name, position);
 }
 

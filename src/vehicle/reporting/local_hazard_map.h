@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "common/sqlite.h"
+#include "protocol/duplicate_filter.h"
 #include "protocol/hazard_catalogue.h"
 #include "protocol/notice.h"
 #include "protocol/report.h"
 #include "vehicle/outbox/report_salvage.h"
 #include "vehicle/outbox/row_validation.h"
-#include "vehicle/reporting/duplicate_filter.h"
 #include "vehicle/reporting/notice_sequence_tracker.h"
 
 namespace livemap::vehicle {
@@ -90,8 +90,8 @@ class LocalHazardMap {
   const InvalidRows& broken_rows() const { return broken_rows_; }
 
   /// The known hazard that a sighting duplicates.
-  std::optional<DuplicateFilter::Match> Find(const std::string& class_name,
-                                             const geo::GeoPoint& position) const;
+  std::optional<protocol::DuplicateFilter::Match> Find(const std::string& class_name,
+                                                       const geo::GeoPoint& position) const;
   /// `hold_until_ns` is kept with it, for whoever sends it: UTC by the vehicle's clock, until which
   /// it may wait for a cheap link; 0: not at all.
   AddResult Add(const protocol::Report& report, std::int64_t hold_until_ns = 0);
@@ -189,7 +189,7 @@ class LocalHazardMap {
   Salvage salvage_;
   InvalidRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
-  DuplicateFilter filter_;
+  protocol::DuplicateFilter filter_;
   std::map<std::string, ZoneMemory> zones_;                                  // By id.
   std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
   std::uint64_t beyond_zone_ = 0;

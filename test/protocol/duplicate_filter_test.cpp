@@ -1,4 +1,4 @@
-#include "vehicle/reporting/duplicate_filter.h"
+#include "protocol/duplicate_filter.h"
 
 #include <gmock/gmock.h>
 
@@ -7,11 +7,11 @@
 #include "common/error.h"
 #include "test/vehicle/reporting/known_reports.h"
 
-namespace livemap::vehicle {
+namespace livemap::protocol {
 namespace {
 
 TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
-  DuplicateFilter filter{protocol::HazardCatalogue()};
+  DuplicateFilter filter{HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   const auto match = filter.Find("pothole", East(4.99));
   ASSERT_TRUE(match);
@@ -21,13 +21,13 @@ TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
 }
 
 TEST(DuplicateFilter, AnotherClassIsAnotherHazard) {
-  DuplicateFilter filter{protocol::HazardCatalogue()};
+  DuplicateFilter filter{HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   EXPECT_FALSE(filter.Find("debris", kStreet));
 }
 
 TEST(DuplicateFilter, RadiusIsTheOneOfTheClass) {
-  DuplicateFilter filter{protocol::HazardCatalogue::Parse(
+  DuplicateFilter filter{HazardCatalogue::Parse(
       "classes: {deer: {duplicate_radius_m: 50}, cone: {duplicate_radius_m: 1}}", "test")};
   filter.Put(Id(1), "deer", kStreet);
   filter.Put(Id(2), "cone", kStreet);
@@ -37,7 +37,7 @@ TEST(DuplicateFilter, RadiusIsTheOneOfTheClass) {
 }
 
 TEST(DuplicateFilter, MovedHazardIsKnownAtItsNewPlaceOnly) {
-  DuplicateFilter filter{protocol::HazardCatalogue()};
+  DuplicateFilter filter{HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   filter.Put(Id(1), "pothole", East(20));
   EXPECT_EQ(filter.size(), 1u);
@@ -46,7 +46,7 @@ TEST(DuplicateFilter, MovedHazardIsKnownAtItsNewPlaceOnly) {
 }
 
 TEST(DuplicateFilter, RemovedHazardIsNoLongerKnown) {
-  DuplicateFilter filter{protocol::HazardCatalogue()};
+  DuplicateFilter filter{HazardCatalogue()};
   filter.Put(Id(1), "pothole", kStreet);
   filter.Put(Id(2), "pothole", East(8));
   EXPECT_TRUE(filter.Remove(Id(1)));
@@ -56,7 +56,7 @@ TEST(DuplicateFilter, RemovedHazardIsNoLongerKnown) {
 }
 
 TEST(DuplicateFilter, InvalidPositionIsNeverADuplicateAndNeverKept) {
-  DuplicateFilter filter{protocol::HazardCatalogue()};
+  DuplicateFilter filter{HazardCatalogue()};
   EXPECT_THROW(filter.Put(Id(1), "pothole", {std::nan(""), 0}), Error);
   filter.Put(Id(1), "pothole", kStreet);
   EXPECT_FALSE(filter.Find("pothole", {std::nan(""), 0}));
@@ -68,7 +68,7 @@ TEST(DuplicateFilter, AgreesWithBruteForceOverClassesMovesAndRemovals) {
     geo::GeoPoint position;
   };
   const std::vector<std::string> classes = {"pothole", "deer", "cone"};
-  const auto catalogue = protocol::HazardCatalogue::Parse(
+  const auto catalogue = HazardCatalogue::Parse(
       "classes: {deer: {duplicate_radius_m: 25}, cone: {duplicate_radius_m: 1.5}}", "test");
   // Astride the antimeridian, where naive grids miss neighbours.
   const geo::GeoPoint centre{64.0, 179.99995};
@@ -106,4 +106,4 @@ TEST(DuplicateFilter, AgreesWithBruteForceOverClassesMovesAndRemovals) {
 }
 
 }  // namespace
-}  // namespace livemap::vehicle
+}  // namespace livemap::protocol

@@ -10,7 +10,7 @@
 #include "geo/wgs84.h"
 #include "protocol/hazard_catalogue.h"
 
-namespace livemap::vehicle {
+namespace livemap::protocol {
 
 /// Knows where hazards are and says whether a sighting is one of them: the same class within the
 /// class's duplicate radius, as the geodesic measures it (thesis, section 3.1). The cost of every
@@ -22,7 +22,7 @@ class DuplicateFilter {
     double distance_m;
   };
 
-  explicit DuplicateFilter(protocol::HazardCatalogue catalogue);
+  explicit DuplicateFilter(HazardCatalogue catalogue);
 
   /// Adds a hazard, or moves the one that has this id. Throws Error for an invalid position.
   void Put(const Uuid& id, const std::string& class_name, const geo::GeoPoint& position);
@@ -48,7 +48,7 @@ class DuplicateFilter {
 
   ClassMap::iterator IndexOf(const std::string& class_name);
 
-  protocol::HazardCatalogue catalogue_;
+  HazardCatalogue catalogue_;
   ClassMap classes_;  // Only classes of which a hazard is known.
   // The grid speaks of hazards by number: their place in known_; free numbers are used again.
   std::vector<Known> known_;
@@ -56,4 +56,4 @@ class DuplicateFilter {
   std::unordered_map<Uuid, std::uint64_t> numbers_;
 };
 
-}  // namespace livemap::vehicle
+}  // namespace livemap::protocol

@@ -1,4 +1,4 @@
-#include "vehicle/alerts/cross_zone_duplicates.h"
+#include "protocol/cross_zone_duplicates.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,14 +9,20 @@
 
 #include "geo/wgs84.h"
 
-namespace livemap::vehicle {
+namespace livemap::protocol {
 namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-AlertHazard HazardAt(std::uint8_t number, double east_m, const std::string& name = "pothole") {
-  AlertHazard hazard;
+struct BorderHazard {
+  Uuid id;
+  std::string class_name;
+  geo::GeoPoint position;
+};
+
+BorderHazard HazardAt(std::uint8_t number, double east_m, const std::string& name = "pothole") {
+  BorderHazard hazard;
   hazard.id.bytes[15] = number;
   hazard.class_name = name;
   hazard.position = geo::GeodesicDestination({49.2, 7.0}, M_PI / 2, east_m);
@@ -26,24 +32,24 @@ AlertHazard HazardAt(std::uint8_t number, double east_m, const std::string& name
 class CrossZoneDuplicatesTest : public testing::Test {
  protected:
   /// Numbers of the hazards that are shown now, in their order.
-  std::vector<int> Put(const AlertHazard& hazard, const std::string& zone) {
-    CrossZoneDuplicates::Changes changes;
+  std::vector<int> Put(const BorderHazard& hazard, const std::string& zone) {
+    CrossZoneDuplicates<BorderHazard>::Changes changes;
     duplicates_.Put(hazard, zone, changes);
     return Show(changes);
   }
   std::vector<int> Remove(std::uint8_t number) {
-    CrossZoneDuplicates::Changes changes;
+    CrossZoneDuplicates<BorderHazard>::Changes changes;
     duplicates_.Remove(HazardAt(number, 0).id, changes);
     return Show(changes);
   }
-  std::vector<int> Show(const CrossZoneDuplicates::Changes& changes) {
-    for (const AlertHazard& hazard : changes.put) there_.insert(hazard.id.bytes[15]);
+  std::vector<int> Show(const CrossZoneDuplicates<BorderHazard>::Changes& changes) {
+    for (const BorderHazard& hazard : changes.put) there_.insert(hazard.id.bytes[15]);
     for (const Uuid& id : changes.gone) there_.erase(id.bytes[15]);
     return {there_.begin(), there_.end()};
   }
 
-  CrossZoneDuplicates duplicates_{protocol::HazardCatalogue()};
-  const double radius_m_ = protocol::HazardCatalogue().DuplicateRadiusM("pothole");
+  CrossZoneDuplicates<BorderHazard> duplicates_{HazardCatalogue()};
+  const double radius_m_ = HazardCatalogue().DuplicateRadiusM("pothole");
   std::set<int> there_;
 };
 
@@ -90,7 +96,7 @@ TEST_F(CrossZoneDuplicatesTest, OnesThatMoveApartAreBothShownAndOnesThatMeetAreO
 TEST_F(CrossZoneDuplicatesTest, WithinOneSetOfChangesTheLastWordCounts) {
   Put(HazardAt(1, 0), "west");
   Put(HazardAt(2, 10 * radius_m_), "east");
-  CrossZoneDuplicates::Changes changes;
+  CrossZoneDuplicates<BorderHazard>::Changes changes;
   duplicates_.Put(HazardAt(1, 10 * radius_m_), "west", changes);
   duplicates_.Put(HazardAt(2, 20 * radius_m_), "east", changes);
   EXPECT_THAT(changes.gone, IsEmpty());
@@ -98,4 +104,4 @@ TEST_F(CrossZoneDuplicatesTest, WithinOneSetOfChangesTheLastWordCounts) {
 }
 
 }  // namespace
-}  // namespace livemap::vehicle
+}  // namespace livemap::protocol

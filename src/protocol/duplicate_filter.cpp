@@ -1,12 +1,11 @@
-#include "vehicle/reporting/duplicate_filter.h"
+#include "protocol/duplicate_filter.h"
 
 #include <utility>
 
 #include "common/error.h"
 
-namespace livemap::vehicle {
-DuplicateFilter::DuplicateFilter(protocol::HazardCatalogue catalogue)
-    : catalogue_(std::move(catalogue)) {}
+namespace livemap::protocol {
+DuplicateFilter::DuplicateFilter(HazardCatalogue catalogue) : catalogue_(std::move(catalogue)) {}
 
 void DuplicateFilter::Put(const Uuid& id, const std::string& class_name,
                           const geo::GeoPoint& position) {
@@ -53,4 +52,4 @@ DuplicateFilter::ClassMap::iterator DuplicateFilter::IndexOf(const std::string& 
       .first;
 }
 
-}  // namespace livemap::vehicle
+}  // namespace livemap::protocol
