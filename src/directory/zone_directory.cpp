@@ -20,6 +20,7 @@ using Json = nlohmann::json;
 constexpr std::uint64_t kFormat = 1;
 constexpr std::size_t kMaxNameBytes = 64;
 constexpr std::size_t kMaxHostBytes = 253;
+constexpr std::size_t kMaxUrlBytes = 512;
 constexpr std::size_t kMaxShownBytes = 60;
 /// Numbers of JSON are exact up to here in every program that may read them (RFC 7493).
 constexpr std::uint64_t kMaxVersion = (std::uint64_t{1} << 53) - 1;
@@ -136,7 +137,7 @@ class DirectoryReader {
     const std::string id = ReadId(feature, "id");
     const Json& properties = Member(feature, "properties");
     return {id, ReadName(properties), ReadArea(Member(feature, "geometry")),
-            ReadBrokers(properties)};
+            ReadBrokers(properties), ReadMapUrl(properties)};
   }
 
   std::string ReadName(const Json& properties) const {
@@ -214,6 +215,21 @@ class DirectoryReader {
       brokers.push_back({ReadHost(broker), ReadPort(broker), ReadFingerprint(broker)});
     }
     return brokers;
+  }
+
+  /// What it may hold goes into a line of a request.
+  std::string ReadMapUrl(const Json& properties) const {
+    constexpr std::string_view kUrlCharacters =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-_~:/[]";
+    const auto value = properties.find("map");
+    if (value == properties.end() || value->is_null()) return "";
+    std::string url = value->is_string() ? value->get<std::string>() : "";
+    const bool has_scheme = url.rfind("https://", 0) == 0 || url.rfind("http://", 0) == 0;
+    if (!has_scheme || url.size() > kMaxUrlBytes ||
+        url.find_first_not_of(kUrlCharacters) != std::string::npos) {
+      Refuse("'map' is " + Shown(*value), "http(s)://HOST or http(s)://HOST/PATH");
+    }
+    return url;
   }
 
   std::string ReadHost(const Json& broker) const {

@@ -26,6 +26,7 @@ struct ZoneEntry {
   std::string name;  ///< For people; empty: none.
   ZoneArea area;
   std::vector<BrokerAddress> brokers;  ///< At least one; the first that answers is taken.
+  std::string map_url;  ///< Of its live map, "https://zone.example"; empty: not told.
 };
 
 /// An authority's list of its zones (docs/reference/zone-directory.md): a GeoJSON
