@@ -33,6 +33,7 @@ import { whenStill } from './layers/still_map.js';
 import { StreetLayer } from './layers/street_layer.js';
 import { VehicleLayer } from './layers/vehicle_layer.js';
 import { ZoneData } from './zone_data.js';
+import { ZoneView } from './panel/zone_view.js';
 import { getJson } from './zone_lists.js';
 
 const L = window.L;
@@ -81,7 +82,8 @@ class Page {
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue, config.streets, this.repair.rows(hazard),
-        [...this.frames.section(hazard), this.history.section(hazard),
+        // A hazard's history stays in its zone.
+        [...this.frames.section(hazard), ...(config.region ? [] : [this.history.section(hazard)]),
           ...this.officials.buttons(hazard, this.work.button(hazard))]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
@@ -153,6 +155,7 @@ class Page {
     this.hasLists = false;
     this.refitSoon = throttled(() => this.refit(), 1000);
     this.refitLater = throttled(() => this.refit(), VIEW_AGE_MS);
+    this.zones = config.region ? new ZoneView(this.map, (text) => this.say(text)) : null;
     this.map.addControl(new FitControl(() => {
       this.followsZone = false;
       this.fitAll();

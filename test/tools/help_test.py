@@ -11,7 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 OF_SCRIPTS = ("setup", "demo", "test", "bench", "bench vo", "bench life", "evaluate", "evaluate drive", "bag", "broker",
               "zone", "zone init", "zone enroll", "zone revoke", "zone install", "vehicle", "vehicle check", "vehicle install",
               "privacy-models")
-OF_PROGRAMS = ("simulate", "evaluate vo", "evaluate detection", "bag from-tum")
+OF_PROGRAMS = ("simulate", "region", "evaluate vo", "evaluate detection", "bag from-tum")
 
 
 class HelpTest(unittest.TestCase):
