@@ -2,13 +2,29 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "common/error.h"
-#include "test/vehicle/reporting/known_reports.h"
+#include "geo/wgs84.h"
 
 namespace livemap::protocol {
 namespace {
+
+constexpr geo::GeoPoint kStreet{40.4433, -79.9436};
+
+geo::GeoPoint East(double distance_m) {
+  return geo::GeodesicDestination(kStreet, M_PI / 2, distance_m);
+}
+
+Uuid Id(int number) {
+  Uuid id;
+  id.bytes[0] = 1;
+  id.bytes[14] = static_cast<std::uint8_t>(number / 256);
+  id.bytes[15] = static_cast<std::uint8_t>(number % 256);
+  return id;
+}
 
 TEST(DuplicateFilter, SameClassWithinTheRadiusIsADuplicate) {
   DuplicateFilter filter{HazardCatalogue()};
