@@ -63,7 +63,7 @@ TEST(ZoneAnswer, HasWhatAZoneTells) {
 TEST(ZoneAnswer, KeepsTheMillisecondsOfAStamp) {
   Json feature = Feature();
   feature["properties"]["last_seen"] = "2025-12-31T23:59:59.250Z";
-  const ZoneAnswer answer = ParseZoneAnswer(Answer({feature}).dump(), 0, kNowNs);
+  const ZoneAnswer answer = ParseZoneAnswer(Answer(Json::array({feature})).dump(), 0, kNowNs);
   ASSERT_EQ(answer.hazards.size(), 1U) << answer.refusal;
   EXPECT_EQ(answer.hazards[0].hazard.last_seen_ns, kNowNs - 750'000'000);
 }
@@ -120,7 +120,7 @@ TEST(ZoneAnswer, KeepsAHazardWhoseStreetIsNoText) {
   feature["properties"]["street"] = "a\x01";
   feature["properties"]["near"] = 5;
   feature["properties"]["direction"] = std::string(300, 'n');
-  const ZoneAnswer answer = ParseZoneAnswer(Answer({feature}).dump(), 0, kNowNs);
+  const ZoneAnswer answer = ParseZoneAnswer(Answer(Json::array({feature})).dump(), 0, kNowNs);
   ASSERT_EQ(answer.hazards.size(), 1U);
   EXPECT_EQ(answer.hazards[0].words.street, "");
   EXPECT_EQ(answer.hazards[0].words.near, "");
