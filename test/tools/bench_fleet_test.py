@@ -1,0 +1,57 @@
+#!/usr/bin/python3
+"""`livemap bench fleet` against a real broker and zone, with a small fleet; and its mistakes.
+
+    bench_fleet_test.py SCRIPT
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SCRIPT = pathlib.Path(sys.argv.pop()).resolve()
+ROOT = SCRIPT.parents[1]
+sys.path.insert(0, str(SCRIPT.parent / "lib"))
+import city_traffic  # noqa: E402
+from system_error import StartError  # noqa: E402
+
+
+def bench(*flags):
+    return subprocess.run([str(SCRIPT), "--root", str(ROOT), *flags], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          text=True, timeout=240, check=False)
+
+
+class BenchFleetTest(unittest.TestCase):
+    def test_a_small_fleet_stays_connected_and_is_told(self):
+        with tempfile.TemporaryDirectory() as out:
+            done = bench("--quick", "--json", "--out", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            figures = json.loads(done.stdout)
+            page = (pathlib.Path(out) / "fleet.md").read_text(encoding="utf-8")
+        fleet, = figures["fleets"]
+        self.assertEqual((fleet["connected"], fleet["lost"], fleet["refused"]), (20, 0, 0))
+        self.assertGreater(fleet["positions"], 40)
+        self.assertEqual(fleet["joined"], 20)
+        self.assertGreater(fleet["up_bit_s"], 500)
+        self.assertIn("| 20 of 20 |", page)
+        self.assertEqual(set(fleet["cores"]), {"broker", "bridge", "zone", "fleet", "machine"})
+
+    def test_a_wrong_number_of_vehicles_is_one_sentence(self):
+        done = bench("--vehicles", "0")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertEqual(done.stderr, "livemap bench fleet: --vehicles is 0, accepted are 1 to 12000, together, see --help\n")
+
+    def test_sumo_that_is_missing_is_one_sentence(self):
+        path, os.environ["PATH"] = os.environ["PATH"], "/nonexistent"
+        try:
+            with self.assertRaisesRegex(StartError, "'netgenerate' is not installed, --movement sumo needs it: apt install sumo"):
+                city_traffic.require_sumo()
+        finally:
+            os.environ["PATH"] = path
+
+
+if __name__ == "__main__":
+    unittest.main()
