@@ -28,8 +28,8 @@ namespace {
 constexpr std::size_t kMaxBytes = 1 << 20;
 constexpr std::size_t kKeptAnnouncements = 1000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr std::int64_t kLoginPatienceNs = 120 * kSecondNs;
-constexpr std::int64_t kSurveyPatienceNs = 180 * kSecondNs;
+constexpr std::int64_t kLoginPatienceNs = 300 * kSecondNs;
+constexpr std::int64_t kSurveyPatienceNs = 600 * kSecondNs;
 constexpr double kSurveyMps = 25;
 /// The surveys are this old: what they report lasts for weeks.
 constexpr std::int64_t kSurveyAgeNs = 3 * 86400 * kSecondNs;

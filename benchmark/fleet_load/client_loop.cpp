@@ -10,14 +10,12 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <optional>
 #include <utility>
 // The system's own structure: that of netinet has no counters of bytes.
 #include <linux/tcp.h>
 
 #include "common/clock.h"
 #include "common/error.h"
-#include "transport/broker_certificate.h"
 
 namespace livemap::bench {
 namespace {
@@ -31,7 +29,6 @@ struct ClientLoop::Connection {
   ClientLoop* loop = nullptr;
   std::size_t number = 0;
   std::vector<transport::MqttSubscription> subscriptions;
-  std::optional<transport::BrokerCertificate> certificate;  ///< With TLS.
   transport::MosquittoHandle handle;
   int socket = -1;
   std::size_t granted = 0;
@@ -63,14 +60,7 @@ std::size_t ClientLoop::Connect(const Client& client) {
   connection->number = connections_.size();
   connection->subscriptions = client.subscriptions;
   const transport::MqttAddress broker{config.host, config.port, config.fingerprint};
-  if (config.tls) {
-    connection->certificate.emplace();
-    const std::string fault = connection->certificate->Expect(broker, *config.tls);
-    if (!fault.empty()) throw Error("client '" + client.id + "': TLS: " + fault);
-  }
-  connection->handle = transport::MakeMosquittoHandle(
-      config, connection->certificate ? connection->certificate->context() : nullptr,
-      connection.get());
+  connection->handle = transport::MakeMosquittoHandle(config, nullptr, connection.get());
   mosquitto* const handle = connection->handle.get();
   mosquitto_connect_v5_callback_set(handle, &OnConnect);
   mosquitto_subscribe_v5_callback_set(handle, &OnSubscribe);
@@ -127,7 +117,6 @@ void ClientLoop::Serve(Connection& connection, std::uint32_t events) {
   if (connection.is_lost) return;
   mosquitto* const handle = connection.handle.get();
   if ((events & ~std::uint32_t{EPOLLOUT}) != 0) {
-    // TLS may hold more than one packet when the socket has nothing left.
     std::uint64_t before = 0;
     do {
       before = connection.callbacks;

@@ -26,9 +26,9 @@ class ClientLoop {
     std::function<void(std::size_t client, const transport::MqttMessage&)> on_message;
     std::function<void(std::size_t client, const std::string& reason)> on_lost;
   };
-  /// What went over a client's TCP connection: MQTT and, where there is TLS, TLS.
+  /// What went over a client's TCP connection.
   struct Traffic {
-    std::uint64_t sent_bytes = 0;  ///< That the broker's machine acknowledged.
+    std::uint64_t sent_bytes = 0;  ///< That the other end acknowledged.
     std::uint64_t received_bytes = 0;
   };
 
