@@ -28,11 +28,11 @@ the page counts
   another hazard than the database has, or a gap or a repetition in the database's numbers;
 - **wrote late**: a paused process that wrote after it lost its lease.
 
-**Map back** is the time from the signal until a process answers `/readyz` and `/api/v1/hazards` with
-status 200 and its map holds every event that the database had when the fault struck. **By the
+**Map back** is the time from the signal until a process answers `/readyz` and `/api/v1/hazards`
+with status 200 and its map holds every event that the database had when the fault struck. **By the
 standby** counts the rounds in which that was the other process. In the rest roslaunch started the
-killed one again within the lease, and it won the race for it. After SIGCONT the page waits until the
-paused process has ended by itself.
+killed one again within the lease, and it won the race for it. After SIGCONT the page waits until
+the paused process has ended by itself.
 
 ```
 ./livemap bench faults --only kill_active --only pause_active

@@ -21,8 +21,9 @@ constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
 constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
 constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
-/// Of a gradient, what its direction errs by: a pixel that sees one ray makes steps of slanted
-/// edges.
+/// Of a gradient, what its direction errs by, in what is stated: a pixel that sees one ray makes
+/// steps of slanted edges, which slide along them. Steps trust it all the same, weak edges are
+/// often right.
 constexpr float kJaggedShare = 0.12F;
 constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
@@ -271,7 +272,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
     if (stale) BuildNormalEquations(points, sigma);
     stale = false;
     if (!seen && points.gradient_noise > 0) {
-      seen.emplace(PoseInformation(), NoiseInformation(points, camera, sigma));
+      seen.emplace(PoseInformation(), NoiseInformation(points, camera, sigma, 0));
     }
     if (!Solve(damping, step)) break;
     // Else noise would move the camera along stripes.
@@ -334,7 +335,7 @@ void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) 
 /// As BuildNormalEquations with the variance of the noise in the place of the gradients' squares;
 /// some of the points say enough.
 Matrix6d Aligner::NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,
-                                   double sigma) const {
+                                   double sigma, float jagged_share) const {
   constexpr std::size_t kEvery = 8;
   Eigen::Matrix<float, 6, 6> sum = Eigen::Matrix<float, 6, 6>::Zero();
   const auto k = static_cast<float>(config_.huber_k * sigma);
@@ -345,7 +346,7 @@ Matrix6d Aligner::NoiseInformation(const EdgePoints& points, const geo::CameraIn
     const float inverse = 1 / points.z[i], x = points.x[i] * inverse, y = points.y[i] * inverse;
     across << inverse, 0, -x * inverse, -x * y, 1 + x * x, -y;
     down << 0, inverse, -y * inverse, -1 - y * y, x * y, x;
-    const float jagged = kJaggedShare * points.slope[i];
+    const float jagged = jagged_share * points.slope[i];
     const float noise = static_cast<float>(points.gradient_noise) + jagged * jagged;
     const float weight =
         noise * whitening_[i] * whitening_[i] * k / std::max(std::abs(current_.value[i]), k);
@@ -387,7 +388,7 @@ void Aligner::Summarise(const EdgePoints& points, const geo::CameraIntrinsics& c
   result.covariance =
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);
   if (points.gradient_noise > 0) {
-    const SeenMovements seen(pose, NoiseInformation(points, camera, sigma));
+    const SeenMovements seen(pose, NoiseInformation(points, camera, sigma, kJaggedShare));
     result.covariance = seen.Widened(result.covariance, kUnseen);
   }
 }

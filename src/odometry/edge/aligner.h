@@ -103,9 +103,10 @@ class Aligner {
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
   float PerSlope(const EdgePoints& points) const;
   void CountExplained(const EdgePoints& points, AlignmentResult& result) const;
-  /// What the noise of the gradients alone adds to the pose's part of the normal equations.
+  /// What the noise of the gradients alone adds to the pose's part of the normal equations, that
+  /// of so large a share of each gradient included.
   Matrix6d NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,
-                            double sigma) const;
+                            double sigma, float jagged_share) const;
   /// The pose's part of the normal equations without what gain and bias could explain.
   Matrix6d PoseInformation() const;
   void Summarise(const EdgePoints& points, const geo::CameraIntrinsics& camera, double sigma,
