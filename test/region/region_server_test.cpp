@@ -86,13 +86,21 @@ TEST_F(RegionServerTest, ServesTheHazardsOfAllZonesInListFeedsAndStream) {
                                          RegionHazardId("south", second).ToString()}));
   EXPECT_EQ(Listed(), 2U);
   EXPECT_EQ(Get("/ogc/collections/hazards/items").Json()["numberReturned"], 2);
-  for (const char* feed : {"/feeds/hazards.csv", "/feeds/hazards.atom", "/feeds/srti.xml",
-                           "/feeds/cifs.json", "/feeds/denm.ndjson", "/feeds/hazards.gpx"}) {
+  for (const char* feed :
+       {"/feeds/hazards.csv", "/feeds/hazards.atom", "/feeds/cifs.json", "/feeds/denm.ndjson"}) {
     const auto answer = Get(feed);
     EXPECT_EQ(answer.status, 200) << feed;
     for (const std::string& id : told) EXPECT_THAT(answer.body, HasSubstr(id)) << feed;
   }
-  EXPECT_EQ(Get("/feeds/wzdx.geojson").status, 200);
+  // Waypoints have no id.
+  const std::string waypoints = Get("/feeds/hazards.gpx").body;
+  for (const char* latitude : {"40.4433000", "40.3000000"}) {
+    EXPECT_THAT(waypoints, HasSubstr(latitude));
+  }
+  // Neither road works nor safety-related traffic information.
+  for (const char* feed : {"/feeds/srti.xml", "/feeds/wzdx.geojson"}) {
+    EXPECT_EQ(Get(feed).status, 200) << feed;
+  }
   EXPECT_EQ(Get("/api/v1/hazards/" + *told.begin()).Json()["properties"]["class"], "pothole");
   EXPECT_THAT(Get("/api/v1/hazards/points").body, HasSubstr(*told.begin()));
 }

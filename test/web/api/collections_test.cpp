@@ -31,8 +31,8 @@ TEST(ListAnswer, ReadsOnceAtATimeAlsoWhereNothingMatches) {
     ASSERT_EQ(reads, i);
   }
   EXPECT_FALSE(answer.pieces(piece));
-  EXPECT_EQ(piece,
-            R"({"type":"FeatureCollection","features":[{}],"sequence":7,"truncated":false})");
+  EXPECT_EQ(piece, R"({"type":"FeatureCollection","features":[{}],"sequence":7,"truncated":false,)"
+                   R"("log":"00000000-0000-0000-0000-000000000000"})");
 }
 
 }  // namespace
