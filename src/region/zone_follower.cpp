@@ -71,8 +71,7 @@ ZoneAnswer ZoneFollower::Ask(std::uint64_t after) {
 }
 
 void ZoneFollower::BeginAnew(const Uuid& log) {
-  reading_.emplace();
-  reading_->log = log;
+  reading_ = Reading{log, 0, {}};
   const MutexLock lock(mutex_);
   if (!place_.log.IsNil()) ++status_.begun_anew;
 }

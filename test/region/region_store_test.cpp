@@ -21,7 +21,7 @@ class RegionStoreTest : public testing::Test {
   std::string path() const { return folder_.path() + "/region.sqlite3"; }
 
   test::TemporaryDirectory folder_;
-  const protocol::HazardCatalogue catalogue_;
+  const protocol::HazardCatalogue catalogue_{};
 };
 
 TEST_F(RegionStoreTest, HasWhatWasKeptOfEachZone) {
