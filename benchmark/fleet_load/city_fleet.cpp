@@ -6,26 +6,21 @@
 #include <livemap/HazardReport.h>
 #include <livemap/ReportReceipt.h>
 #include <livemap/VehiclePosition.h>
-#include <ros/message_traits.h>
-#include <ros/serialization.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <utility>
 
 #include "common/clock.h"
 #include "common/error.h"
-#include "ros/bridge/bridged_type.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
-#include "transport/envelope.h"
+#include "zone_messages.h"
 
 namespace livemap::bench {
 namespace {
 
-constexpr std::size_t kMaxBytes = 1 << 20;
 constexpr std::size_t kKeptAnnouncements = 1000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kLoginPatienceNs = 300 * kSecondNs;
@@ -38,39 +33,6 @@ constexpr double kSightM = 20;
 constexpr double kSeen = 0.75;  ///< Of the passes: hit_rate of a pothole.
 constexpr char kClass[] = "pothole";
 const geo::GeoPoint kSouthWest{40.0, -80.0};
-
-template <typename Message>
-std::vector<std::uint8_t> EncloseFleetMessage(const Message& message) {
-  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  ros::serialization::serialize(stream, message);
-  return transport::EncodeEnvelope({ros::message_traits::datatype<Message>(),
-                                    *transport::ParseMd5(ros::message_traits::md5sum<Message>()),
-                                    {bytes.data(), bytes.size()}});
-}
-
-/// The zone is ours: what it sends is trusted but for its type.
-template <typename Message>
-Message OpenFleetMessage(const transport::MqttMessage& message) {
-  static const auto type =
-      ros_io::MakeBridgedType(ros::message_traits::datatype<Message>(), kMaxBytes);
-  const ros_io::DecodedBridgeMessage decoded = type->Decode(message.payload);
-  if (!decoded.reason.empty()) throw Error("message of the zone: " + decoded.reason);
-  Message content;
-  const transport::ByteView payload = decoded.serialised;
-  // The stream wants a writable pointer and only reads.
-  ros::serialization::IStream stream(const_cast<std::uint8_t*>(payload.data),
-                                     static_cast<std::uint32_t>(payload.size));
-  ros::serialization::deserialize(stream, content);
-  return content;
-}
-
-std::string FleetPassword(const std::string& path) {
-  std::ifstream file(path);
-  std::string password;
-  if (!std::getline(file, password)) throw Error("no password in '" + path + "'");
-  return password;
-}
 
 double MillisecondsSinceNs(std::int64_t begin_ns) {
   return static_cast<double>(SteadyNs() - begin_ns) * 1e-6;
@@ -114,7 +76,7 @@ std::size_t CityFleet::AddClient(const std::string& id, const std::string& zone_
                                                             {vehicle.topics + "change_receipt", 1}};
   if (!zone_notices.empty()) subscriptions.push_back({zone_notices, 1});
   vehicles_.push_back(std::move(vehicle));
-  return loop_.Connect({id, FleetPassword(config_.credentials + "/" + id), subscriptions});
+  return loop_.Connect({id, PasswordOf(config_.credentials + "/" + id), subscriptions});
 }
 
 /// Of the clients from `first` on.
@@ -289,7 +251,7 @@ void CityFleet::SendPosition(std::size_t client, const VehicleStep& step) {
   state.outbox_age_s = 0;
   const bool is_sent =
       loop_.Publish(client, vehicle.topics + "position",
-                    EncloseFleetMessage(ros_io::ToMessage(state, 1.0, vehicle.chain.known())), 0);
+                    Enclose(ros_io::ToMessage(state, 1.0, vehicle.chain.known())), 0);
   if (counting_ && is_sent) ++result_.positions;
 }
 
@@ -322,8 +284,7 @@ void CityFleet::SendReport(std::size_t client, std::uint32_t hazard, std::int64_
   const std::int64_t now_ns = SteadyNs();
   vehicle.reports[report.uuid] = {now_ns};
   last_report_ns_[hazard] = now_ns;
-  loop_.Publish(client, vehicle.topics + "report", EncloseFleetMessage(ros_io::ToMessage(report)),
-                1);
+  loop_.Publish(client, vehicle.topics + "report", Enclose(ros_io::ToMessage(report)), 1);
   if (counting_) ++result_.reports;
 }
 
@@ -351,8 +312,7 @@ void CityFleet::AnswerPolls(std::size_t client, const VehicleStep& step) {
       answer.confidence = 0.8F;
       answer.vehicle_position = city_.ToGeo(step.east_north_m);
       answer.course_rad = step.course_rad;
-      loop_.Publish(client, vehicle.topics + "answer",
-                    EncloseFleetMessage(ros_io::ToMessage(answer)), 1);
+      loop_.Publish(client, vehicle.topics + "answer", Enclose(ros_io::ToMessage(answer)), 1);
       if (counting_) ++result_.poll_answers;
     }
     poll = polls.erase(poll);
@@ -368,13 +328,13 @@ void CityFleet::OnMessage(std::size_t client, const transport::MqttMessage& mess
   } else if (EndsWith(message.topic, "/receipt")) {
     OnReceipt(client, message);
   } else if (EndsWith(message.topic, "/poll")) {
-    vehicles_[client].polls.push_back(ros_io::FromMessage(OpenFleetMessage<HazardPoll>(message)));
+    vehicles_[client].polls.push_back(ros_io::FromMessage(Open<HazardPoll>(message)));
     if (counting_) ++result_.polls;
   }
 }
 
 void CityFleet::OnReceipt(std::size_t client, const transport::MqttMessage& message) {
-  const protocol::Receipt receipt = ros_io::FromMessage(OpenFleetMessage<ReportReceipt>(message));
+  const protocol::Receipt receipt = ros_io::FromMessage(Open<ReportReceipt>(message));
   auto& reports = vehicles_[client].reports;
   const auto waiting = reports.find(receipt.report_uuid);
   if (waiting == reports.end()) return;
@@ -399,7 +359,7 @@ const CityFleet::Announcement& CityFleet::Decode(const transport::MqttMessage& m
   }
   Announcement announcement;
   announcement.payload.assign(message.payload.data, message.payload.data + message.payload.size);
-  announcement.notice = ros_io::FromMessage(OpenFleetMessage<HazardNotice>(message));
+  announcement.notice = ros_io::FromMessage(Open<HazardNotice>(message));
   announcement.hazard = hazards_.FindAt(city_.ToEnu(announcement.notice.position));
   const auto [entry, is_new] =
       announcements_.emplace(announcement.notice.sequence, std::move(announcement));
@@ -438,7 +398,7 @@ void CityFleet::OnNoticeToAll(std::size_t client, const transport::MqttMessage& 
 /// As LocalHazardMap takes it, but for its disk.
 void CityFleet::OnOwnNotice(std::size_t client, const transport::MqttMessage& message) {
   Vehicle& vehicle = vehicles_[client];
-  const protocol::Notice notice = ros_io::FromMessage(OpenFleetMessage<HazardNotice>(message));
+  const protocol::Notice notice = ros_io::FromMessage(Open<HazardNotice>(message));
   if (counting_) result_.told_bytes += message.topic.size() + message.payload.size;
   if (notice.action != protocol::Notice::Action::kCaughtUp) {
     if (counting_) ++result_.told;

@@ -3,19 +3,15 @@
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardReport.h>
 #include <livemap/ReportReceipt.h>
-#include <ros/message_traits.h>
-#include <ros/serialization.h>
 
 #include <algorithm>
-#include <fstream>
 #include <thread>
 #include <utility>
 
 #include "common/clock.h"
 #include "common/error.h"
-#include "ros/bridge/bridged_type.h"
 #include "ros/conversions/hazard_conversions.h"
-#include "transport/envelope.h"
+#include "zone_messages.h"
 
 namespace livemap::bench {
 namespace {
@@ -23,40 +19,6 @@ namespace {
 constexpr std::chrono::seconds kPatience{10};
 constexpr std::chrono::milliseconds kPaceStep{2};
 constexpr std::int64_t kFirstStampAgeNs = 5LL * 86400 * 1'000'000'000;
-constexpr std::size_t kMaxBytes = 1 << 20;
-
-template <typename Message>
-std::vector<std::uint8_t> Enclose(const Message& message) {
-  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
-  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  ros::serialization::serialize(stream, message);
-  return transport::EncodeEnvelope({ros::message_traits::datatype<Message>(),
-                                    *transport::ParseMd5(ros::message_traits::md5sum<Message>()),
-                                    {bytes.data(), bytes.size()}});
-}
-
-/// The zone is ours: what it sends is trusted but for its type.
-template <typename Message>
-Message Open(const transport::MqttMessage& message) {
-  static const auto type =
-      ros_io::MakeBridgedType(ros::message_traits::datatype<Message>(), kMaxBytes);
-  const ros_io::DecodedBridgeMessage decoded = type->Decode(message.payload);
-  if (!decoded.reason.empty()) throw Error("message of the zone: " + decoded.reason);
-  Message content;
-  const transport::ByteView payload = decoded.serialised;
-  // The stream wants a writable pointer and only reads.
-  ros::serialization::IStream stream(const_cast<std::uint8_t*>(payload.data),
-                                     static_cast<std::uint32_t>(payload.size));
-  ros::serialization::deserialize(stream, content);
-  return content;
-}
-
-std::string PasswordOf(const std::string& path) {
-  std::ifstream file(path);
-  std::string password;
-  if (!std::getline(file, password)) throw Error("no password in '" + path + "'");
-  return password;
-}
 
 double MillisecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
