@@ -47,9 +47,8 @@ std::size_t PartSize(std::size_t points) {
 /// nothing.
 constexpr double kUnseen = 100;
 
-/// With the movements that no edge shows. Edges of one
-/// direction leave one unseen; its variance is then a quotient of rounding errors, of either sign,
-/// or zero.
+/// With the movements that no edge shows. Edges of one direction leave one unseen; its variance is
+/// then a quotient of rounding errors, of either sign, or zero.
 Matrix6d WithUnseen(const Matrix6d& covariance, const Matrix6d& information) {
   constexpr double kSeenShare = 1e-9;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> known(information);

@@ -182,6 +182,8 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
                                           std::numeric_limits<float>::max()};
     fresh->inverse_depth_sigmas.Build(inverse_depth_sigma, 1, kAny, cameras_.levels);
   } else {
+    // Depths that are estimates err by more than the noise of the gradients hides.
+    frame_images_.MeasureNoise(frame.grey);
     const int coarsest = cameras_.levels - 1;
     fresh->surfaces.Take(fresh->depths[coarsest],
                          cameras_.camera[static_cast<std::size_t>(coarsest)]);
@@ -280,9 +282,7 @@ double EdgeOdometry::SelectPointsOf(int level, Keyframe& keyframe) {
     selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection, points);
     covered = CoveredShare(points, camera);
   }
-  // Depths that are estimates err by more than the noise of the gradients hides.
-  const bool is_exact = points.inverse_depth_sigma.empty();
-  points.gradient_noise = is_exact ? keyframe.images.GradientNoise(level) : 0;
+  points.gradient_noise = keyframe.images.GradientNoise(level);
   return covered;
 }
 

@@ -137,12 +137,16 @@ geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics) 
 }
 
 void ImagePyramid::Build(const cv::Mat& grey) {
+  gradient_noise_ = {};
   levels_ = CountLevels(grey.size());
   SmoothPyramidLevel(grey, row_, images_[0]);
   for (std::size_t level = 1; level < static_cast<std::size_t>(levels_); ++level) {
     HalvePyramidLevel(images_[level - 1], images_[level]);
   }
   HalvePyramidLevel(images_[static_cast<std::size_t>(levels_ - 1)], thumbnail_);
+}
+
+void ImagePyramid::MeasureNoise(const cv::Mat& grey) {
   // What the smoothing and the halving leave of white noise in a central difference, and what
   // rounding to whole grey levels adds to it.
   constexpr std::array<double, kMaxLevels> kLeft = {0.0586, 0.0489, 0.0206};

@@ -30,8 +30,10 @@ class ImagePyramid {
   const cv::Mat& operator[](int level) const { return images_[static_cast<std::size_t>(level)]; }
   /// A small and smooth view of the whole image: 80x60 for 640x480.
   const cv::Mat& thumbnail() const { return thumbnail_; }
+  /// Measures the noise of `grey`, the picture that the pyramid was built of.
+  void MeasureNoise(const cv::Mat& grey);
   /// Variance of the central difference of a level's grey values, along either axis, that the
-  /// camera's noise and the rounding to whole grey levels alone make.
+  /// camera's noise and the rounding to whole grey levels alone make; 0: not measured.
   double GradientNoise(int level) const { return gradient_noise_[static_cast<std::size_t>(level)]; }
 
  private:
