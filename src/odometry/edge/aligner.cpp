@@ -335,7 +335,7 @@ void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) 
 /// some of the points say enough.
 Matrix6d Aligner::NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,
                                    double sigma, float jagged_share) const {
-  constexpr std::size_t kEvery = 8;
+  constexpr std::size_t kEvery = 32;
   Eigen::Matrix<float, 6, 6> sum = Eigen::Matrix<float, 6, 6>::Zero();
   const auto k = static_cast<float>(config_.huber_k * sigma);
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
