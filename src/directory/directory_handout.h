@@ -52,7 +52,8 @@ class DirectoryHandout {
   /// What is to be given now to vehicles that were heard; then they count as given. `now_ns` is of
   /// a clock that never goes back.
   std::vector<Gift> Next(std::int64_t now_ns);
-  /// It could not be sent to that vehicle.
+  /// It could not be sent to that vehicle, or nobody was there to take it: the vehicle is given it
+  /// at its next message.
   void TakeBack(const std::string& vehicle);
   /// Nobody counts as given any more: the broker began anew.
   void TakeBackAll();

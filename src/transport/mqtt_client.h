@@ -78,6 +78,9 @@ struct MqttPublishOutcome {
   int reason_code = 0;    ///< MQTT v5: below 128 accepted (16: nobody listens), from there refused.
   std::string reason;     ///< The code in words.
   bool accepted() const { return reason_code < 128; }
+  /// The broker took it, and had nobody to give it to: no client subscribes to its topic, and no
+  /// session of one that is away waits for it.
+  bool has_no_listener() const { return reason_code == 16; }
 };
 
 /// What the client calls, always on its network thread. Nothing may block or throw for long: the

@@ -17,7 +17,7 @@ import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from livemap.msg import VehiclePosition  # noqa: E402
 from node_testing import SOURCE_DIRECTORY  # noqa: E402
-from mqtt_bridge_fixture import Bridge, Broker, Master, Peer, eventually  # noqa: E402
+from mqtt_bridge_fixture import Bridge, Broker, Master, Peer, envelope, eventually  # noqa: E402
 
 sys.path.insert(0, os.path.join(SOURCE_DIRECTORY, "scripts", "lib"))
 import certificate_authority  # noqa: E402
@@ -188,6 +188,18 @@ class ZoneDirectoryTest(unittest.TestCase):
         self.put(self.signed(1))
         self.drive_until_version(1)
         self.assertEqual(self.of_vehicle("zone_directory_in"), "1")
+
+    def test_a_vehicle_that_was_heard_before_it_subscribed_is_given_it_at_its_next_message(self):
+        self.put(self.signed(1))
+        self.start_zone()
+        position = envelope(VehiclePosition(latitude=50.5, longitude=7.5))
+
+        def is_given_to_nobody():
+            self.broker.publish_raw("car-1", "livemap/v1/test/vehicle/car-1/position", position)
+            return int(self.of_zone("zone_directory_out") or 0) > 0
+        eventually(is_given_to_nobody, "the zone gives it to the one that it heard")
+        self.start_vehicle()
+        self.drive_until_version(1)
 
     def test_a_restart_of_zone_vehicle_and_broker_keeps_it_and_gives_it_again(self):
         self.put(self.signed(1))

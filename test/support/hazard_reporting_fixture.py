@@ -191,3 +191,10 @@ class Vehicle(NodeletUnderTest):
         self.publish("hazard/detections", detections(time_s, *found))
         if self.uses_events() and found:
             self.publish("hazard/events", detections(time_s, *found))
+
+    def see_in_first_image(self, time_s, *found):
+        """As `see`, of a vehicle that has no image yet: the detections come when the image is surely there."""
+        image = camera_image(time_s)
+        self.publish("camera_rect/image", image)
+        self.wait_for(images_kept=1)
+        self.see(time_s, *found, image=image)

@@ -514,6 +514,14 @@ class MqttBridgePart : public NodeletPart {
     if (!outcome.accepted()) return Refuse(counts, "the broker: " + outcome.reason);
     ++counts.carried;
     counts.bytes += outcome.bytes;
+    // Heard before the broker began anew, the vehicle may not have subscribed again yet.
+    if (handout_ && outcome.has_no_listener()) TakeBackGift(outcome.topic);
+  }
+
+  /// The vehicle of that topic is given the zone directory again at its next message.
+  void TakeBackGift(const std::string& topic) {
+    const std::optional<transport::TopicNames> names = directory_topic_.Match(topic);
+    if (names) handout_->TakeBack(names->vehicle);
   }
 
   void Refuse(Counts& counts, const std::string& reason) {
