@@ -248,7 +248,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle = self.driving_vehicle(drive_id="drive-7")
         vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), picture_wanted=True, max_picture_bytes=20000))
         vehicle.wait_for(polls=1)
-        vehicle.see_in_first_image(3.05, detection(11.2))
+        vehicle.see(3.05, detection(11.2))
         answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
         self.assertEqual((answer.answer, answer.poll_uuid, answer.hazard_uuid),
                          (HazardPollAnswer.YES, bytes([1] * 16), bytes([7] * 16)))
@@ -262,7 +262,7 @@ class HazardReportingTest(unittest.TestCase):
         vehicle.publish("hazard/poll", poll(1, on_street(3.0, 12.0), picture_wanted=True, max_picture_bytes=20000,
                                             picture_kind=HazardPoll.CROP))
         vehicle.wait_for(polls=1)
-        vehicle.see_in_first_image(3.05, detection(11.2))
+        vehicle.see(3.05, detection(11.2))
         answer = eventually(lambda: vehicle.received("hazard/poll_answer"), "an answer")[0]
         self.assertLessEqual(len(answer.image.data), 12000)
         self.assertEqual(decode(answer.image).shape, (320, 480, 3))

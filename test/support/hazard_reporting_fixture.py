@@ -115,7 +115,8 @@ class Vehicle(NodeletUnderTest):
         super().__init__(name, "hazard_reporting")
         self.directory = tempfile.mkdtemp(prefix="livemap_vehicle_")
         self.database = os.path.join(self.directory, "memory", "hazards.sqlite3")
-        self.parameters = dict(parameters, database=self.database)
+        # Masking may take long beside other tests, and no test here is about pictures that come too late.
+        self.parameters = {"picture_wait_s": 50.0, **parameters, "database": self.database}
         self.process = None
         self.publishers = {
             topic: self.advertise(topic, message_class, latch=latch)
@@ -191,10 +192,3 @@ class Vehicle(NodeletUnderTest):
         self.publish("hazard/detections", detections(time_s, *found))
         if self.uses_events() and found:
             self.publish("hazard/events", detections(time_s, *found))
-
-    def see_in_first_image(self, time_s, *found):
-        """As `see`, of a vehicle that has no image yet: the detections come when the image is surely there."""
-        image = camera_image(time_s)
-        self.publish("camera_rect/image", image)
-        self.wait_for(images_kept=1)
-        self.see(time_s, *found, image=image)
