@@ -64,9 +64,15 @@ class BrokerFolder:
         return self.log.read().decode("utf-8", "replace")
 
     def stop(self, how=signal.SIGTERM):
-        if self.process and self.process.poll() is None:
+        """mosquitto forgets a signal that comes after it listens and before its loop begins: then it is told again."""
+        deadline = time.monotonic() + PATIENCE_S
+        while self.process and self.process.poll() is None:
             self.process.send_signal(how)
-            self.process.wait(PATIENCE_S)
+            try:
+                self.process.wait(1)
+            except subprocess.TimeoutExpired:
+                if time.monotonic() > deadline:
+                    raise
 
     def close(self):
         self.stop()
