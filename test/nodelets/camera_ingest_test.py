@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -14,6 +15,10 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
+
+from node_testing import program  # noqa: E402
 
 WIDTH, HEIGHT = 640, 400
 K = np.array([[420.0, 0, 310], [0, 425, 205], [0, 0, 1]])
@@ -249,7 +254,7 @@ class CameraIngestTest(unittest.TestCase):
         parameters.update(_uri=uri, _camera_info_url=f"file://{calibration}", _stamps="file_order",
                           _diagnostics_period_s="0.1", _queue_size="20")
         self.process = subprocess.Popen(
-            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/CameraIngestNodelet",
+            [program("nodelet", "nodelet"), "standalone", "livemap/CameraIngestNodelet",
              f"__ns:={namespace}", "__name:=camera_ingest"] + [f"{key}:={value}" for key, value in parameters.items()])
         return ingest
 

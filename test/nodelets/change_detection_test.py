@@ -25,7 +25,7 @@ from tf2_msgs.msg import TFMessage
 
 from livemap.msg import ChangedObject, ChangedObjects, MapChange, ReportReceipt
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import NodeletUnderTest, eventually, parameters_of  # noqa: E402
+from node_testing import NodeletUnderTest, eventually, parameters_of, program  # noqa: E402
 
 SECONDS, RATE_HZ = 9, 5
 BARRIER_M, SIGN_M, NEW_BARRIER_M = 34, 48, 60
@@ -47,7 +47,7 @@ def simulate(folder, name, hazards, quality):
         }, file)
     bag = os.path.join(folder, name + ".bag")
     done = subprocess.run(
-        ["rosrun", "livemap", "livemap_simulate", "--seed", "5", "--world", world, "--bag", bag, "--size", "320x256", "--one-ray",
+        [program("livemap", "livemap_simulate"), "--seed", "5", "--world", world, "--bag", bag, "--size", "320x256", "--one-ray",
          "--seconds", str(SECONDS), "--rate", str(RATE_HZ), "--speed", "8", "--fix-noise-m", "0.02", "--multipath-m", "0",
          "--jpeg-quality", str(quality)], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr

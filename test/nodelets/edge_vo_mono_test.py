@@ -20,7 +20,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, NavSatFix
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import NodeletUnderTest, eventually, parameters_of  # noqa: E402
+from node_testing import NodeletUnderTest, eventually, parameters_of, program  # noqa: E402
 
 IMAGE, INFO, FIX, WHEELS = "camera/image_raw/compressed", "camera/camera_info", "fix", "wheel/twist"
 CLASSES = {IMAGE: CompressedImage, INFO: CameraInfo, FIX: NavSatFix, WHEELS: TwistWithCovarianceStamped}
@@ -30,8 +30,8 @@ SECONDS, RATE_HZ = 6, 10
 SIZE = (320, 240)
 
 
-def rosrun(*arguments):
-    done = subprocess.run(["rosrun", "livemap", *map(str, arguments)], capture_output=True, text=True, timeout=600)
+def run(tool, *arguments):
+    done = subprocess.run([program("livemap", tool), *map(str, arguments)], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
 
 
@@ -76,7 +76,7 @@ class OneEyeTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="livemap_one_eye_")
         bag = os.path.join(cls.folder, "drive.bag")
-        rosrun("livemap_simulate", "--seed", 7, "--seconds", SECONDS, "--rate", RATE_HZ, "--size", f"{SIZE[0]}x{SIZE[1]}",
+        run("livemap_simulate", "--seed", 7, "--seconds", SECONDS, "--rate", RATE_HZ, "--size", f"{SIZE[0]}x{SIZE[1]}",
                "--one-ray", "--multipath-m", 0, "--fix-noise-m", 0.1, "--bag", bag)
         with rosbag.Bag(bag) as recorded:
             cls.messages = [(topic.lstrip("/"), message) for topic, message, _ in

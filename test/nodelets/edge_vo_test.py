@@ -26,7 +26,7 @@ from tf.transformations import quaternion_matrix
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import NodeletUnderTest, eventually, parameters_of  # noqa: E402
+from node_testing import NodeletUnderTest, eventually, parameters_of, program  # noqa: E402
 
 FRAMES, SIZE = 24, "320x240"
 # base_link to the optical frame: ahead, up, and REP 103's turn.
@@ -35,8 +35,8 @@ IMAGE, DEPTH, INFO = "camera/image_raw", "camera/depth/image_raw", "camera/camer
 CLASSES = {IMAGE: Image, DEPTH: Image, INFO: CameraInfo}
 
 
-def rosrun(*arguments):
-    done = subprocess.run(["rosrun", "livemap", *map(str, arguments)], capture_output=True, text=True,
+def run(tool, *arguments):
+    done = subprocess.run([program("livemap", tool), *map(str, arguments)], capture_output=True, text=True,
                           timeout=600)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -94,9 +94,9 @@ class EdgeVoTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="livemap_edge_vo_")
         cls.sequence, bag = os.path.join(cls.folder, "room"), os.path.join(cls.folder, "room.bag")
-        rosrun("livemap_simulate", "--room", "--tum", cls.sequence, "--size", SIZE, "--rate", 15,
+        run("livemap_simulate", "--room", "--tum", cls.sequence, "--size", SIZE, "--rate", 15,
                "--seconds", (FRAMES + 0.5) / 15, "--one-ray", "--vigour", 2)
-        rosrun("livemap_bag_from_tum", cls.sequence, bag)
+        run("livemap_bag_from_tum", cls.sequence, bag)
         cls.frames = [{} for _ in range(FRAMES)]
         with rosbag.Bag(bag) as recorded:
             for topic in CLASSES:
@@ -140,7 +140,7 @@ class EdgeVoTest(unittest.TestCase):
 
     def expected_poses(self):
         out = os.path.join(self.folder, "expected.txt")
-        figures = json.loads(rosrun("livemap_evaluate_vo", self.sequence, "--json", "--out", out))
+        figures = json.loads(run("livemap_evaluate_vo", self.sequence, "--json", "--out", out))
         self.assertEqual(figures["lost"], 0)
         self.assertLess(figures["ate_rmse_m"], 0.005)
         return [matrix(row[1:4], row[4:8]) for row in numpy.loadtxt(out)]

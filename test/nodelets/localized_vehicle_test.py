@@ -20,7 +20,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, NavSatFix
 
 from livemap.msg import DetectionArray, HazardReport
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import NodeletUnderTest, eventually, parameters_of  # noqa: E402
+from node_testing import NodeletUnderTest, eventually, parameters_of, program  # noqa: E402
 
 DATUM = (50.0, 8.0)
 METRES_PER_DEGREE, METRES_PER_DEGREE_EAST = 111229, 71696  # At 50 degrees north.
@@ -70,7 +70,7 @@ class LocalizedVehicleTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="livemap_localized_")
         bag, hazards = os.path.join(cls.folder, "drive.bag"), os.path.join(cls.folder, "drive.geojson")
-        subprocess.run(["rosrun", "livemap", "livemap_simulate", "--seed", "7", "--seconds", "14", "--size", "320x240",
+        subprocess.run([program("livemap", "livemap_simulate"), "--seed", "7", "--seconds", "14", "--size", "320x240",
                         "--one-ray", "--bag", bag, "--bag-depth", "--hazards", hazards, "--multipath-m", "0",
                         "--start", "50,8"], check=True, timeout=600, stdout=subprocess.DEVNULL)
         with open(hazards, encoding="utf-8") as file:

@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from tf.transformations import quaternion_matrix
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import NodeletUnderTest, eventually, parameters_of  # noqa: E402
+from node_testing import NodeletUnderTest, eventually, parameters_of, program  # noqa: E402
 
 FRAMES, WIDTH, HEIGHT, BASELINE_M = 15, 320, 240, 0.4
 LEFT, LEFT_INFO = "camera/image_raw/compressed", "camera/camera_info"
@@ -82,7 +82,7 @@ class StereoTest(unittest.TestCase):
         cls.folder = tempfile.mkdtemp(prefix="livemap_stereo_")
         bag = os.path.join(cls.folder, "drive.bag")
         done = subprocess.run(
-            ["rosrun", "livemap", "livemap_simulate", "--seed", "5", "--size", f"{WIDTH}x{HEIGHT}", "--rate", "10",
+            [program("livemap", "livemap_simulate"), "--seed", "5", "--size", f"{WIDTH}x{HEIGHT}", "--rate", "10",
              "--seconds", str(FRAMES / 10 + 0.01), "--one-ray", "--stereo", str(BASELINE_M), "--bag-depth",
              "--bag", bag], capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr

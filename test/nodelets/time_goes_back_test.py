@@ -24,7 +24,7 @@ from tf2_msgs.msg import TFMessage
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
 from hazard_reporting_fixture import OPTICAL, SPEED_MPS, detection, detections, fix, stamp  # noqa: E402
 from livemap.msg import DetectionArray, HazardReport, VehiclePosition  # noqa: E402
-from node_testing import SOURCE_DIRECTORY, eventually, start_child  # noqa: E402
+from node_testing import SOURCE_DIRECTORY, eventually, program, start_child  # noqa: E402
 from nodelet_manager import NodeletManager  # noqa: E402
 
 ROUND_S = 8.0
@@ -137,7 +137,7 @@ class TimeGoesBackTest(unittest.TestCase):
                                       "position_period_s": 0.1, "publish_tf": True,
                                       "resend_first_s": 0.3, "resend_longest_s": 0.5}, {})):
             assert cls.manager.load(node, node, dict(parameters, **diagnosed), remap), cls.manager.output()
-        cls.player = start_child(["rosrun", "rosbag", "play", "--quiet", "--loop", "--clock", "--hz=100",
+        cls.player = start_child([program("rosbag", "play"), "--quiet", "--loop", "--clock", "--hz=100",
                                   str(path / "drive.bag")])
 
     @classmethod

@@ -25,7 +25,7 @@ from livemap.msg import (HazardNotice, HazardPoll, HazardPollAnswer, HazardRepor
 from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import PATIENCE_S, eventually  # noqa: E402
+from node_testing import PATIENCE_S, eventually, program  # noqa: E402
 
 
 def make_report(latitude=40.44, longitude=-79.94, class_name="pothole", vehicle_id="car-1"):
@@ -111,14 +111,13 @@ class ZoneCloudletTest(unittest.TestCase):
                   "marker_period_s": 0.1, "diagnostics_period_s": 0.2, "join_gap_s": 600.0,
                   "catch_up_lag_s": 0.2, "catch_up_retry_s": 0.2, "catch_up_longest_retry_s": 0.4}
         values.update(parameters)
-        return (["rosrun", "livemap", "zone_cloudlet", "__name:=zone_cloudlet"] +
+        return ([program("livemap", "zone_cloudlet"), "__name:=zone_cloudlet"] +
                 [f"_{name}:={value}" for name, value in values.items()])
 
     def start(self):
         for inbox in (self.receipts, self.notices, self.own_notices, self.polls, self.markers, self.diagnostics,
                       self.change_receipts):
             inbox.clear()
-        # Of its own process group: rosrun is a shell that does not pass signals on.
         self.process = subprocess.Popen(self.command(), start_new_session=True)
         eventually(lambda: self.reports.get_num_connections() == 1 and
                    self.positions.get_num_connections() == 1 and

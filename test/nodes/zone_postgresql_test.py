@@ -16,7 +16,7 @@ import rostest
 from livemap.msg import HazardReport, ReportReceipt
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
-from node_testing import PATIENCE_S, eventually  # noqa: E402
+from node_testing import PATIENCE_S, eventually, program  # noqa: E402
 import postgresql_server  # noqa: E402
 
 
@@ -55,8 +55,7 @@ class ZonePostgresqlTest(unittest.TestCase):
         self.addCleanup(self.stop)
 
     def start(self):
-        # Of its own process group: rosrun is a shell that does not pass signals on.
-        self.process = subprocess.Popen(["rosrun", "livemap", "zone_cloudlet", "__name:=zone_cloudlet", "_web:=false",
+        self.process = subprocess.Popen([program("livemap", "zone_cloudlet"), "__name:=zone_cloudlet", "_web:=false",
                                          f"_directory:={self.directory}/zone", f"_store_url:={self.url}",
                                          "_max_speed_mps:=10000.0"], start_new_session=True)
         eventually(lambda: self.reports.get_num_connections() == 1 and self.receipts.get_num_connections() == 1,

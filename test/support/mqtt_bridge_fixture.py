@@ -15,7 +15,7 @@ import xmlrpc.client
 
 import yaml
 
-from node_testing import PATIENCE_S, SOURCE_DIRECTORY, TEST_DIRECTORY, eventually, start_child
+from node_testing import PATIENCE_S, SOURCE_DIRECTORY, TEST_DIRECTORY, eventually, program, start_child
 
 sys.path.insert(0, os.path.join(SOURCE_DIRECTORY, "scripts", "lib"))
 from listening_port import free_port  # noqa: E402
@@ -153,8 +153,7 @@ class Bridge:
         master.set_parameters("/" + name, values)
         self.log = tempfile.NamedTemporaryFile(suffix=".log")
         self.process = start_child(
-            ["rosrun", "nodelet", "nodelet", "standalone", "livemap/MqttBridgeNodelet",
-             f"__name:={name}"],
+            [program("nodelet", "nodelet"), "standalone", "livemap/MqttBridgeNodelet", f"__name:={name}"],
             env=master.environment(), stdout=self.log, stderr=subprocess.STDOUT)
 
     def output(self):

@@ -8,7 +8,7 @@ import genpy.dynamic
 import rospkg
 import rospy
 
-from node_testing import start_child
+from node_testing import program, start_child
 
 
 def service(name):
@@ -28,7 +28,7 @@ class NodeletManager:
 
     def __init__(self, name="manager"):
         self.log = tempfile.NamedTemporaryFile(suffix=".log")
-        self.process = start_child(["rosrun", "nodelet", "nodelet", "manager", f"__name:={name}"], stdout=self.log,
+        self.process = start_child([program("nodelet", "nodelet"), "manager", f"__name:={name}"], stdout=self.log,
                                    stderr=self.log, env=dict(os.environ, ROSCONSOLE_FORMAT="[${severity}] ${message}"))
         rospy.wait_for_service(f"/{name}/load_nodelet", 60)
         self.services = {each: rospy.ServiceProxy(f"/{name}/{each}", service(kind)) for each, kind in (

@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -13,11 +14,15 @@ import numpy as np
 import rosbag
 import rostest
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
+
+from node_testing import program  # noqa: E402
+
 WIDTH, HEIGHT = 640, 400
 
 
 def run(tool, *arguments):
-    return subprocess.run(["rosrun", "livemap", f"livemap_bag_{tool}", *map(str, arguments)],
+    return subprocess.run([program("livemap", f"livemap_bag_{tool}"), *map(str, arguments)],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=200)
 
 

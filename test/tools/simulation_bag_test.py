@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -13,6 +14,10 @@ import numpy as np
 import rosbag
 import rostest
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
+
+from node_testing import program  # noqa: E402
+
 DRIVE = ["--seed", 3, "--seconds", 3, "--rate", 2, "--size", "160x120", "--one-ray",
          "--start", "50,8"]
 METRES_PER_DEGREE = 111229  # of latitude at 50 degrees north
@@ -20,7 +25,7 @@ METRES_PER_DEGREE_EAST = 71696
 
 
 def run(*arguments):
-    return subprocess.run(["rosrun", "livemap", "livemap_simulate", *map(str, arguments)],
+    return subprocess.run([program("livemap", "livemap_simulate"), *map(str, arguments)],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=300)
 
 
