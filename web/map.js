@@ -24,6 +24,7 @@ import { HazardLayer } from './layers/hazard_layer.js';
 import { HazardList, hazardRow } from './panel/hazard_list.js';
 import { popupContent } from './popups/hazard_popup.js';
 import { nearLongitude } from './mercator.js';
+import { NeighbourLayer } from './layers/neighbour_layer.js';
 import { Officials } from './popups/officials.js';
 import { ReviewQueue } from './panel/review_queue.js';
 import { askToLogIn, session, startSession } from './session.js';
@@ -156,6 +157,7 @@ class Page {
     this.refitSoon = throttled(() => this.refit(), 1000);
     this.refitLater = throttled(() => this.refit(), VIEW_AGE_MS);
     this.zones = config.region ? new ZoneView(this.map, (text) => this.say(text)) : null;
+    if (config.neighbours) new NeighbourLayer(this.map, this.catalogue);
     this.map.addControl(new FitControl(() => {
       this.followsZone = false;
       this.fitAll();

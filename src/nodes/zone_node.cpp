@@ -97,8 +97,9 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       config_.zone.directory, zone_, SystemNs,
       [](const std::string& line) { ROS_INFO("%s", line.c_str()); });
   if (config_.web) {
+    if (!config_.neighbours.directory.empty()) FollowNeighbours();
     web_ = std::make_unique<web::WebServer>(config_.web_options, zone_, config_.zone.catalogue,
-                                            orders_.get());
+                                            orders_.get(), neighbours_.get());
     private_node.setParam("/livemap/web_port", web_->port());
   }
   subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { OnEvent(event); });
@@ -122,6 +123,16 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
         "there and do not count. The first: %s",
         config_.zone.directory.c_str(), damage.rows, damage.first.c_str());
   }
+}
+
+void ZoneNode::FollowNeighbours() {
+  const auto& from = config_.neighbours;
+  neighbours_ = std::make_unique<region::Neighbours>(
+      region::Neighbours::Config{from.zone, from.directory, from.authority,
+                                 config_.zone.directory + "/neighbours", from.ca_file,
+                                 from.margin_m, from.ask_every_s},
+      zone_, config_.zone.catalogue, SystemNs,
+      [](const std::string& line) { ROS_INFO("neighbours: %s", line.c_str()); });
 }
 
 /// One line for whoever waits for it in a terminal or a log file.
@@ -379,7 +390,15 @@ void ZoneNode::OnMarkerTimer(const ros::SteadyTimerEvent&) {
   marker_publisher_.publish(markers);
 }
 
-void ZoneNode::OnDiagnosticsTimer(const ros::SteadyTimerEvent&) { updater_.force_update(); }
+void ZoneNode::OnDiagnosticsTimer(const ros::SteadyTimerEvent&) {
+  updater_.force_update();
+  if (!neighbours_) return;
+  try {
+    neighbours_->Renew();
+  } catch (const Error& error) {
+    ROS_ERROR_THROTTLE(kSayAgainS, "no neighbours are followed: %s", error.what());
+  }
+}
 
 void ZoneNode::Diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   ros_io::ZoneCloudletCounters counters;

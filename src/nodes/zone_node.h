@@ -22,6 +22,7 @@
 #include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
 #include "orders/desk/order_desk.h"
+#include "region/neighbours.h"
 #include "ros/conversions/zone_conversions.h"
 #include "ros/parameters/zone_cloudlet_parameters.h"
 #include "web/server/web_server.h"
@@ -63,6 +64,7 @@ class ZoneNode {
 
   /// Makes `datum` the origin of the map frame.
   void SetMap(const geo::GeoPoint& datum) REQUIRES(mutex_);
+  void FollowNeighbours();
   void SayReady() const;
   void SayCertificate(const web::CertificateState& certificate);
   void WorkUntilClosed();
@@ -104,6 +106,7 @@ class ZoneNode {
   int subscription_ = 0;
   std::unique_ptr<orders::OrderDesk> orders_;  ///< Null: the zone has no work orders.
   std::unique_ptr<zone::ErasureDesk> erasures_;
+  std::unique_ptr<region::Neighbours> neighbours_;  ///< Null: no other zone is followed.
   std::unique_ptr<web::WebServer> web_;
   web::CertificateState certificate_;  ///< As it was told last; the diagnostics' timer's.
   std::thread worker_;

@@ -76,7 +76,7 @@ void RegionMap::Remove(const std::string& zone, const std::vector<Uuid>& hazards
 }
 
 void RegionMap::Put(const std::string& zone, const ToldHazard& told) {
-  Shown shown{told.hazard, told.words};
+  Shown shown{told.hazard, told.words, {zone, told.hazard.uuid}};
   zone::Hazard& hazard = shown.hazard;
   hazard.uuid = RegionHazardId(zone, told.hazard.uuid);
   hazard.class_name = catalogue_.HeadingOf(told.hazard.class_name);
@@ -185,6 +185,12 @@ std::size_t RegionMap::CountOf(const std::string& zone) const {
 std::size_t RegionMap::hidden() const {
   const MutexLock lock(writer_mutex_);
   return duplicates_.hidden();
+}
+
+std::optional<HazardOrigin> RegionMap::OriginOf(const Uuid& id) const {
+  const ReaderLock lock(data_mutex_);
+  const auto found = shown_.find(id);
+  return found == shown_.end() ? std::nullopt : std::optional(found->second.origin);
 }
 
 std::uint64_t RegionMap::Sequence() const {

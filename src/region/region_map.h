@@ -27,6 +27,12 @@ namespace livemap::region {
 /// after every start (a UUID of version 8, RFC 9562).
 Uuid RegionHazardId(const std::string& zone, const Uuid& hazard);
 
+/// Where a hazard of the region's map comes from.
+struct HazardOrigin {
+  std::string zone;  ///< Its id.
+  Uuid hazard;       ///< The zone's own id of the hazard.
+};
+
 /// The hazards of many zones as one map: those that drivers are told of. Each change gets the next
 /// number of the region's own sequence. A hazard that two zones hold at their border is on the map
 /// once (protocol::CrossZoneDuplicates). Classes that the catalogue does not name are under its
@@ -56,6 +62,8 @@ class RegionMap : public zone::MapReader {
   std::size_t CountOf(const std::string& zone) const;
   /// Hazards that are not shown, because another zone has them.
   std::size_t hidden() const;
+  /// Of a hazard that is on the map, or was and is remembered; none for any other.
+  std::optional<HazardOrigin> OriginOf(const Uuid& id) const;
 
   std::uint64_t Sequence() const override;
   Uuid LogId() const override { return log_id_; }
@@ -92,6 +100,7 @@ class RegionMap : public zone::MapReader {
   struct Shown {
     zone::Hazard hazard;
     streets::StreetWords words;
+    HazardOrigin origin;
   };
 
   void Put(const std::string& zone, const ToldHazard& told) REQUIRES(writer_mutex_);

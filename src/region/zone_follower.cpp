@@ -35,6 +35,7 @@ ZoneFollower::ZoneFollower(RegionZone zone, Call call, Clock now_ns, RegionMap& 
   RegionStore::Kept kept = store_.Load(zone_.id, now_ns_());
   place_ = kept.place;
   saved_heard_ns_ = place_.heard_ns;
+  KeepSurroundings(kept.hazards);
   map_.Apply(zone_.id, kept.hazards);
   const MutexLock lock(mutex_);
   status_.heard_ns = place_.heard_ns;
@@ -84,6 +85,7 @@ bool ZoneFollower::Take(ZoneAnswer answer, std::uint64_t after) {
     if (after > 0) return true;
   }
   LeaveOutBeyond(answer);
+  KeepSurroundings(answer.hazards);
   LogPlace place = place_;
   place.heard_ns = now_ns_();
   std::vector<Uuid> gone;
@@ -144,6 +146,16 @@ void ZoneFollower::LeaveOutBeyond(ZoneAnswer& answer) const {
   answer.refusal = "a hazard lies more than " + std::to_string(static_cast<int>(kMaxBeyondM)) +
                    " m outside of the zone's area";
   hazards.erase(end, hazards.end());
+}
+
+/// One that has moved out of what is wanted has left, as far as this map is concerned.
+void ZoneFollower::KeepSurroundings(std::vector<ToldHazard>& hazards) const {
+  if (!zone_.only) return;
+  for (ToldHazard& told : hazards) {
+    if (told.IsThere() && !zone_.only->Have(told.hazard.position)) {
+      told.hazard.state = zone::HazardState::kGone;
+    }
+  }
 }
 
 void ZoneFollower::SayUp(const ZoneAnswer& answer) {

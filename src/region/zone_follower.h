@@ -18,6 +18,17 @@
 
 namespace livemap::region {
 
+/// What lies in an area, or not far beyond its border.
+struct Surroundings {
+  directory::ZoneArea area;
+  double margin_m;  ///< Beyond the border.
+
+  /// `position` is valid.
+  bool Have(const geo::GeoPoint& position) const {
+    return area.IsNear(position, margin_m) && area.DepthM(position) >= -margin_m;
+  }
+};
+
 /// A zone of a region, and how it is reached.
 struct RegionZone {
   std::string id;     ///< As transport::IsValidId accepts it.
@@ -26,6 +37,8 @@ struct RegionZone {
   std::string token;  ///< Of an official, which is shown to the zone; empty: the region asks as
                       ///< anybody may.
   std::optional<directory::ZoneArea> area;  ///< None: it is not known.
+  /// Of its hazards these alone count; none: all of them.
+  std::optional<Surroundings> only = std::nullopt;
 };
 
 /// How a zone is, as far as the region knows.
@@ -72,6 +85,7 @@ class ZoneFollower {
   /// The answer to the question what came after `after`.
   bool Take(ZoneAnswer answer, std::uint64_t after);
   void LeaveOutBeyond(ZoneAnswer& answer) const;
+  void KeepSurroundings(std::vector<ToldHazard>& hazards) const;
   void BeginAnew(const Uuid& log);
   void SayUp(const ZoneAnswer& answer);
   void SayDown(const std::string& trouble);

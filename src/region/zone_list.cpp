@@ -49,25 +49,32 @@ std::pair<std::string, std::string> SplitNamed(const std::string& flag, const st
   return {text.substr(0, at), text.substr(at + 1)};
 }
 
+RegionZone ZoneOf(const directory::ZoneEntry& entry) {
+  RegionZone zone;
+  zone.id = entry.id;
+  zone.name = entry.name;
+  zone.area = entry.area;
+  zone.url = CheckedUrl(entry.id, entry.map_url);
+  return zone;
+}
+
 std::vector<RegionZone> ZonesOf(const ZoneList& list, const directory::ZoneDirectory* directory) {
   std::vector<RegionZone> zones;
   std::map<std::string, std::string> urls = list.urls;
   if (directory != nullptr) {
     for (const directory::ZoneEntry& entry : directory->zones()) {
-      RegionZone zone;
-      zone.id = entry.id;
-      zone.name = entry.name;
-      zone.area = entry.area;
+      directory::ZoneEntry addressed = entry;
       const auto by_hand = urls.find(entry.id);
-      const std::string url = by_hand == urls.end() ? entry.map_url : by_hand->second;
-      if (url.empty()) {
+      if (by_hand != urls.end()) {
+        addressed.map_url = by_hand->second;
+        urls.erase(by_hand);
+      }
+      if (addressed.map_url.empty()) {
         throw Error("zone '" + entry.id +
                     "' has no address: accepted is a 'map' in the directory, or --zone " +
                     entry.id + "=URL");
       }
-      zone.url = CheckedUrl(entry.id, url);
-      if (by_hand != urls.end()) urls.erase(by_hand);
-      zones.push_back(std::move(zone));
+      zones.push_back(ZoneOf(addressed));
     }
   }
   for (const auto& [id, url] : urls) {

@@ -15,6 +15,9 @@ struct ZoneList {
   std::map<std::string, std::string> token_files;  ///< Each holds the bearer token for a zone.
 };
 
+/// A zone of a directory, which names its map. Throws Error for an address that is none.
+RegionZone ZoneOf(const directory::ZoneEntry& entry);
+
 /// All zones of the directory (null: there is none) and of the list. An address by hand counts
 /// before the directory's. Throws Error that names what is not accepted: an address that is none,
 /// a zone of the directory without an address, a token for a zone that there is not, a token file

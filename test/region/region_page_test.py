@@ -28,11 +28,11 @@ class RegionPage(MapPage):
         for zone in (self.north, self.south):
             self.addCleanup(zone.close)
             zone.start()
-        directory, authority = directory_of(
+        self.directory, self.authority = directory_of(
             [square("north", "The North", LAT, LON - 0.05, LAT + 0.05, LON + 0.05, self.north.url),
              square("south", HOSTILE, LAT - 0.05, LON - 0.05, LAT, LON + 0.05, self.south.url)], self.folder)
-        self.region = Region(OPTIONS.region, os.path.join(self.folder, "region"), "--directory", directory,
-                             "--authority", authority, "--title", "All zones of the town")
+        self.region = Region(OPTIONS.region, os.path.join(self.folder, "region"), "--directory", self.directory,
+                             "--authority", self.authority, "--title", "All zones of the town")
         self.addCleanup(self.region.close)
         self.region.start()
         self.addCleanup(self.browser.get, "about:blank")
@@ -48,6 +48,34 @@ class RegionPage(MapPage):
 
     def wait_listed(self, count):
         self.wait(lambda: self.find("#list-count").get_attribute("textContent") == str(count), f"not {count} are listed")
+
+
+class NeighbourPage(RegionPage):
+    """A zone's own page, which shows what lies behind its border."""
+
+    def test_what_another_zone_tells_behind_the_border_has_a_pin_of_its_own_kind_and_leads_to_that_zone(self):
+        here, behind = LAT + 0.0005, LAT - 0.0005
+        self.north.add("pothole", here, LON)
+        # On the border: both zones hold it.
+        self.north.add("debris", LAT + 0.00001, LON + 0.001)
+        self.south.add("debris", LAT - 0.00001, LON + 0.001)
+        hazard = self.south.add("barrier", behind, LON)
+        self.assertEqual(self.north.process.do("follow", zone="north", directory=self.directory, authority=self.authority,
+                                               store=os.path.join(self.folder, "neighbours"))["zones"], ["south"])
+        self.browser.get(self.north.process.url)
+        self.wait_state("live")
+        pin = '.pin[data-neighbour="south"]'
+        self.wait(lambda: self.count(pin) == 1, "not one hazard of the other zone is shown")
+        self.wait(lambda: self.count(".pin:not([data-neighbour])") == 2, "the zone's own two are not shown")
+        self.assertIn(HOSTILE, self.find(pin).get_attribute("aria-label"))
+        self.wait_listed(2)
+        self.click(pin)
+        self.wait_for_text(".popup", "Barrier", HOSTILE, "Another zone tells drivers of it")
+        self.assertEqual(self.find(".popup a").get_attribute("href"), self.south.url + "/")
+        self.picture("neighbour")
+        self.assertTrue(self.south.process.do("remove", id=hazard)["removed"])
+        self.wait(lambda: self.count(pin) == 0, "it stays though the other zone took it back")
+        self.assert_quiet()
 
 
 class Desktop(RegionPage):

@@ -23,7 +23,7 @@ const PARTED_PX = 60;
 const MAX_LISTED = 30;
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 
-const SignIcon = L.Icon.extend({
+export const SignIcon = L.Icon.extend({
   createIcon() {
     const { name, build } = this.options;
     const node = element('button', { type: 'button', title: name, 'aria-label': name });

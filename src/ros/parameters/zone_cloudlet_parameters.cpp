@@ -417,6 +417,37 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   if (config.map_datum) web.centre = *config.map_datum;
 }
 
+void ReadZoneNeighbours(ParameterReader& parameters, ZoneCloudletConfig& config) {
+  ZoneCloudletConfig::Neighbours& neighbours = config.neighbours;
+  parameters.Section("Neighbours",
+                     "The live map shows what lies right behind the zone's borders, as the zones "
+                     "there tell it: docs/explanation/changing-zones.md.");
+  parameters.Read("zone_directory", neighbours.directory,
+                  "The authority's signed zone directory (docs/reference/zone-directory.md), which "
+                  "names the zones and the addresses of their maps. Empty: no other zone is "
+                  "followed. zone.launch sets it, and the next two.");
+  parameters.Read("zone", neighbours.zone, "Id of this zone in the directory.");
+  parameters.Read("zone_authority", neighbours.authority,
+                  "Certificate of the authority that signs the directory, a PEM file.");
+  parameters.Read("neighbour_margin_m", neighbours.margin_m, {0, 20000},
+                  "Hazards of other zones that lie so far from the own area at most are shown. 0: "
+                  "no other zone is followed.",
+                  "m");
+  parameters.Read("neighbour_ask_every_s", neighbours.ask_every_s, {0.1, 3600},
+                  "Time between two questions to a zone that is up.", "s");
+  parameters.Read("neighbour_ca_file", neighbours.ca_file,
+                  "Certificates that are trusted where a neighbour's map is at https://. Empty: "
+                  "the system's.");
+  if (neighbours.margin_m == 0) neighbours.directory.clear();
+  if (neighbours.directory.empty()) return;
+  for (const auto& [name, value] :
+       {std::pair("zone", &neighbours.zone), std::pair("zone_authority", &neighbours.authority)}) {
+    if (!value->empty()) continue;
+    throw Error(std::string("parameter '") + name + "' is empty and 'zone_directory' is '" +
+                neighbours.directory + "', accepted are all three or none");
+  }
+}
+
 /// After the store and the work orders.
 void ReadZoneLease(ParameterReader& parameters, ZoneCloudletConfig& config) {
   parameters.Section("Failover",
@@ -487,6 +518,7 @@ ZoneCloudletConfig ReadZoneCloudletConfig(ParameterReader& parameters,
   ReadZoneLease(parameters, config);
   ReadZoneMarkers(parameters, config);
   ReadZoneWeb(parameters, package_path, config);
+  ReadZoneNeighbours(parameters, config);
   parameters.RejectUnknown({"diagnostic_period"});  // diagnostic_updater's own.
   return config;
 }

@@ -35,6 +35,18 @@ struct ZoneCloudletConfig {
   bool json_log = false;  ///< The log is lines of JSON.
   bool web = true;        ///< Serve the live map.
   web::WebConfig web_options;
+
+  /// The zones around this one, whose hazards near the border the live map shows
+  /// (region::Neighbours).
+  struct Neighbours {
+    std::string zone;       ///< This zone's id in the directory.
+    std::string directory;  ///< Signed file of all zones; empty: no other zone is followed.
+    std::string authority;
+    std::string ca_file;
+    double margin_m = 500;
+    double ask_every_s = 2;
+  };
+  Neighbours neighbours;
 };
 
 /// Reads and checks every private parameter; `package_path` completes the defaults that name files

@@ -50,7 +50,7 @@ zone::PictureLimits LimitsOf(const WebConfig& options) {
 
 Api::Api(const WebConfig& options, zone::ZoneService& zone,
          const protocol::HazardCatalogue& catalogue, const VehicleTrails& trails,
-         orders::OrderDesk* orders)
+         orders::OrderDesk* orders, const NeighbourReader* neighbours)
     : options_(options),
       zone_(zone),
       catalogue_(catalogue),
@@ -65,6 +65,7 @@ Api::Api(const WebConfig& options, zone::ZoneService& zone,
       feeds_({options_, zone, catalogue}),
       ogc_({options_, zone, catalogue}),
       order_desk_(orders),
+      neighbours_(neighbours),
       orders_(access_, zone, orders),
       pictures_([limits = LimitsOf(options)](
                     const auto& file) { return zone::RecodePicture(file, limits); },
@@ -255,6 +256,10 @@ HttpResponse Api::RouteApi(const RequestTarget& target, const HttpRequest& quest
   }
   RefuseQueryParameters(target);
   if (is_decision) return PostOnly();
+  if (path == kNeighbourAddress && neighbours_ != nullptr) {
+    if (!sees.told) return LogInFirst();
+    return JsonAnswer(NeighboursJson(neighbours_->Hazards(), catalogue_), "application/geo+json");
+  }
   if (path == "/api/v1/classes") return JsonAnswer(ClassesJson(catalogue_));
   if (path == "/api/v1/vehicles") return sees.vehicles ? Vehicles() : LogInFirst();
   if (path == kSessionAddress) return access_.Session(question);
@@ -329,6 +334,7 @@ HttpResponse Api::PageConfig() const {
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
   config["officials"] = access_.is_open();
   config["orders"] = order_desk_ != nullptr;
+  config["neighbours"] = neighbours_ != nullptr;
   config["streets"] = zone_.streets() != nullptr;
   config["view"] = nullptr;
   auto view = zone_.View();

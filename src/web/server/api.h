@@ -14,6 +14,7 @@
 #include "web/api/feed_api.h"
 #include "web/api/hazard_api.h"
 #include "web/api/map_change_api.h"
+#include "web/api/neighbour_api.h"
 #include "web/api/query.h"
 #include "web/api/street_api.h"
 #include "web/api/vehicle_trails.h"
@@ -38,10 +39,12 @@ namespace livemap::web {
 /// (docs/reference/http-api.md) and the feeds (docs/reference/feeds.md). Thread-safe; never throws.
 class Api : public Site {
  public:
-  /// Keeps references to all but `options`. `orders`: null where the zone has no work orders.
+  /// Keeps references to all but `options`. `orders`: null where the zone has no work orders,
+  /// `neighbours`: null where it does not follow other zones.
   /// Throws Error when the token file, the accounts or the file of tiles is not accepted.
   Api(const WebConfig& options, zone::ZoneService& zone, const protocol::HazardCatalogue& catalogue,
-      const VehicleTrails& trails, orders::OrderDesk* orders = nullptr);
+      const VehicleTrails& trails, orders::OrderDesk* orders = nullptr,
+      const NeighbourReader* neighbours = nullptr);
 
   /// From now on metrics tell what this says of the server, whose answers nobody else counts.
   void TellServer(std::function<ServerMetrics()> server);
@@ -99,6 +102,7 @@ class Api : public Site {
   const FeedApi feeds_;
   const OgcApi ogc_;
   const orders::OrderDesk* const order_desk_;  ///< Null where the zone has no work orders.
+  const NeighbourReader* const neighbours_;    ///< Null where it does not follow other zones.
   OrderApi orders_;
   std::optional<TileFile> tiles_;
   DurationHistogram answer_times_;

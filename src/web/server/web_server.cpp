@@ -19,9 +19,10 @@ std::optional<std::int64_t> CertificateEnd(const std::optional<CertificateState>
 class WebServer::Implementation {
  public:
   Implementation(const Options& options, zone::ZoneService& zone,
-                 const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders)
+                 const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders,
+                 const NeighbourReader* neighbours)
       : hub_(zone, catalogue, trails_),
-        api_(options, zone, catalogue, trails_, orders),
+        api_(options, zone, catalogue, trails_, orders, neighbours),
         live_{zone, catalogue, hub_},
         server_(options, api_, &live_) {
     api_.TellServer([this] {
@@ -54,9 +55,10 @@ class WebServer::Implementation {
 };
 
 WebServer::WebServer(const Options& options, zone::ZoneService& zone,
-                     const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders) {
+                     const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders,
+                     const NeighbourReader* neighbours) {
   Validate(options);
-  implementation_ = std::make_unique<Implementation>(options, zone, catalogue, orders);
+  implementation_ = std::make_unique<Implementation>(options, zone, catalogue, orders, neighbours);
 }
 
 WebServer::~WebServer() = default;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "protocol/hazard_catalogue.h"
+#include "web/api/neighbour_api.h"
 #include "web/http/web_config.h"
 #include "web/server/api.h"
 #include "web/server/tls_certificate.h"
@@ -21,10 +22,11 @@ class WebServer {
   using Options = WebConfig;
 
   /// Listens and serves from its own threads when it returns. Keeps references to `zone`,
-  /// `catalogue` and `orders` (null: the zone has no work orders). Throws Error when an option is
-  /// not accepted or the port cannot be opened.
+  /// `catalogue`, `orders` (null: the zone has no work orders) and `neighbours` (null: it does not
+  /// follow other zones). Throws Error when an option is not accepted or the port cannot be opened.
   WebServer(const Options& options, zone::ZoneService& zone,
-            const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders = nullptr);
+            const protocol::HazardCatalogue& catalogue, orders::OrderDesk* orders = nullptr,
+            const NeighbourReader* neighbours = nullptr);
   /// Closes every connection and joins the threads.
   ~WebServer();
   WebServer(const WebServer&) = delete;

@@ -24,6 +24,9 @@
 //    once
 //                                           is given up. Kinds and secrets are those of
 //                                           test/orders/order_recipients.py; no classes: all
+//   {"do": "follow", "zone": Z, "directory": F, "authority": F, "store": DIR}   the server starts
+//   anew
+//                                           and shows what zones around Z tell -> {"zones"}
 //   {"do": "log_out_all"}                   their passwords are set again -> {"password"}
 //   {"do": "fill", "count": N, "lat": D, "lon": D}                      -> {"hazards"}
 //   {"do": "row", "class": C, "count": N, "lat": D, "lon": D}           hazards 20 m apart, going
@@ -54,6 +57,7 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "orders/desk/order_desk.h"
+#include "region/neighbours.h"
 #include "streets/street_file.h"
 #include "test/web/zone_fixture.h"
 #include "zone/service/erasure_desk.h"
@@ -126,6 +130,7 @@ class Session {
     if (verb == "accounts") return OpenAccounts(command);
     if (verb == "session") return OpenSession(command);
     if (verb == "orders") return OpenOrders(command);
+    if (verb == "follow") return Follow(command);
     if (verb == "log_out_all") return SetPasswords();
     if (verb == "fill") return Fill(command);
     if (verb == "row") return AddToldRow(command);
@@ -141,10 +146,24 @@ class Session {
 
  private:
   Json Start() {
-    server_ = std::make_unique<livemap::web::WebServer>(options_, *fixture_.zone,
-                                                        fixture_.catalogue, orders_.get());
+    server_ = std::make_unique<livemap::web::WebServer>(
+        options_, *fixture_.zone, fixture_.catalogue, orders_.get(), neighbours_.get());
     options_.port = server_->port();
     return {{"running", true}};
+  }
+
+  Json Follow(const Json& command) {
+    livemap::region::Neighbours::Config config;
+    config.zone = command.at("zone");
+    config.directory = command.at("directory");
+    config.authority = command.at("authority");
+    config.store = command.at("store");
+    config.ask_every_s = 0.2;
+    server_.reset();
+    neighbours_ = std::make_unique<livemap::region::Neighbours>(
+        config, *fixture_.zone, fixture_.catalogue, livemap::SystemNs, [](const std::string&) {});
+    Start();
+    return {{"zones", neighbours_->zones()}};
   }
 
   void Tick() { fixture_.now_ns = livemap::SystemNs() + ahead_ns_; }
@@ -367,7 +386,8 @@ class Session {
   livemap::web::TemporaryFolder orders_folder_;
   livemap::web::WebConfig options_;
   std::optional<livemap::zone::ErasureDesk> erasures_;
-  std::unique_ptr<livemap::orders::OrderDesk> orders_;  ///< Null: the zone has no work orders.
+  std::unique_ptr<livemap::orders::OrderDesk> orders_;       ///< Null: the zone has no work orders.
+  std::unique_ptr<livemap::region::Neighbours> neighbours_;  ///< Null: it follows no other zone.
   std::unique_ptr<livemap::web::WebServer> server_;
 };
 
