@@ -82,7 +82,7 @@ bool ZoneFailover::TryTake(web::StandbyServer* web) {
     active_ = lease_->Read();
     const bool is_taken = active_.valid_s <= 0 && lease_->TryTake();
     error_.clear();
-    if (web != nullptr) web->Tell({active_.holder, active_.epoch});
+    if (web != nullptr) web->Tell(active_.epoch);
     return is_taken;
   } catch (const Error& error) {
     error_ = error.what();

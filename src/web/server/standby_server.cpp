@@ -1,8 +1,7 @@
 #include "web/server/standby_server.h"
 
-#include <utility>
+#include <atomic>
 
-#include "common/mutex.h"
 #include "web/http/http_message.h"
 #include "web/http/page_answer.h"
 #include "web/http/request_target.h"
@@ -16,10 +15,7 @@ namespace livemap::web {
 /// Answers the same whoever asks.
 class StandbySite : public Site {
  public:
-  void Tell(StandbyServer::Active active) {
-    const MutexLock lock(mutex_);
-    active_ = std::move(active);
-  }
+  void Tell(std::uint64_t epoch) { epoch_ = epoch; }
 
   HttpResponse Answer(const HttpRequest& question) override {
     HttpResponse answer = Route(question);
@@ -32,28 +28,22 @@ class StandbySite : public Site {
 
  private:
   HttpResponse Route(const HttpRequest& question) {
-    StandbyServer::Active active;
-    {
-      const MutexLock lock(mutex_);
-      active = active_;
-    }
     const std::string path = question.target.substr(0, question.target.find('?'));
     const bool is_read = question.method == "GET" || question.method == "HEAD";
     if (is_read && path == "/healthz") return JsonAnswer({{"status", "standby"}});
     if (is_read && path == "/metrics") {
       HttpResponse answer;
       answer.content_type = kMetricsType;
-      answer.content = StandbyMetricsText({false, active.epoch, 0});
+      answer.content = StandbyMetricsText({false, epoch_, 0});
       answer.headers.emplace_back("Cache-Control", "no-store");
       return answer;
     }
-    return MakeBusyAnswer("this server is the zone's standby, the active one is '" +
-                          (active.holder.empty() ? "unknown" : active.holder) + "'");
+    // Nobody logs in here: who the active one is would be told to everybody.
+    return MakeBusyAnswer("this server is the zone's standby, another one is active");
   }
 
   const std::string page_policy_ = PagePolicy("");
-  Mutex mutex_;
-  StandbyServer::Active active_ GUARDED_BY(mutex_);
+  std::atomic<std::uint64_t> epoch_{0};
 };
 
 class StandbyServer::Implementation {
@@ -75,7 +65,7 @@ StandbyServer::StandbyServer(const WebConfig& options) {
 
 StandbyServer::~StandbyServer() = default;
 
-void StandbyServer::Tell(Active active) { implementation_->site().Tell(std::move(active)); }
+void StandbyServer::Tell(std::uint64_t epoch) { implementation_->site().Tell(epoch); }
 
 int StandbyServer::port() const { return implementation_->server().port(); }
 

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "web/http/web_config.h"
 
@@ -10,20 +9,14 @@ namespace livemap::web {
 
 /// The web server of a process that waits to become the active one of its zone, at the address of
 /// the live map. It says that it is alive (/healthz) and not ready (/readyz, status 503), and has
-/// the metrics of the lease; all else is answered 503 with the name of the active process, so that
-/// a proxy asks the other server.
+/// the metrics of the lease; all else is answered 503, so that a proxy asks the other server.
+/// Nobody is told which one that is.
 ///
 /// Typical usage:
 ///   StandbyServer server(options);
-///   server.Tell({"host-a", 7});
+///   server.Tell(7);
 class StandbyServer {
  public:
-  /// Who is active, as far as the standby knows.
-  struct Active {
-    std::string holder;       ///< Of the lease; empty: not known.
-    std::uint64_t epoch = 0;  ///< Of the lease; 0: not known.
-  };
-
   /// Listens and serves from its own threads when it returns. Throws Error when an option is not
   /// accepted or the port cannot be opened.
   explicit StandbyServer(const WebConfig& options);
@@ -32,8 +25,8 @@ class StandbyServer {
   StandbyServer(const StandbyServer&) = delete;
   StandbyServer& operator=(const StandbyServer&) = delete;
 
-  /// What is answered from now on. Any thread may.
-  void Tell(Active active);
+  /// The lease's epoch, as the metrics have it from now on; 0: not known. Any thread may.
+  void Tell(std::uint64_t epoch);
   /// The port it listens on, also where the options asked for any.
   int port() const;
 
