@@ -49,7 +49,7 @@ docs/how-to/run-a-region.md has all of it.
   --public-url URL         of this server as others reach it, for links in feeds
   --title TEXT             of the page (default LiveMap)
   --publisher TEXT         of the feeds (default: the title)
-  --country CODE           of the publisher, two lower-case letters (default other)
+  --country CODE           of the publisher, two lower-case letters (default zz: not said)
   --tile-url URL           of a background map, with {z}, {x} and {y} (default: none)
   --tile-file FILE         a background map of one file, MBTiles (default: none)
   --tile-attribution TEXT  whose map it is

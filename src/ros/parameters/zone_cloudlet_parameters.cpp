@@ -365,8 +365,8 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
   parameters.Read("feed_publisher", web.feed_publisher,
                   "Who publishes the feeds (docs/reference/feeds.md). Empty: web_title.");
   parameters.Read("feed_country", web.feed_country,
-                  "Country of who publishes the feeds: two lower-case letters (ISO 3166-1), or "
-                  "other.");
+                  "Country of who publishes the feeds: two lower-case letters (ISO 3166-1); zz: "
+                  "not said.");
   parameters.Read("web_threads", web.threads, {1, 64}, "Number of threads of the web server.");
   parameters.Read("web_max_connections", web.max_connections, {1, 100000},
                   "Number of connections. Whoever comes when all are taken takes the place of one "

@@ -12,7 +12,7 @@ struct FeedHead {
   std::string base;         ///< Address of the server without a last '/', "https://map.example".
   std::string self;         ///< Address of the feed.
   std::string publisher;    ///< Who publishes it, for people.
-  std::string country;      ///< ISO 3166-1 alpha-2 in lower case, or "other".
+  std::string country;      ///< ISO 3166-1 alpha-2 in lower case; "zz": not said.
   std::int64_t now_ns = 0;  ///< When it is made, UTC ns since 1970.
 };
 

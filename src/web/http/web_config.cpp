@@ -55,10 +55,10 @@ void ValidateFeeds(const WebConfig& options) {
     throw Error("public_url is '" + options.public_url +
                 "', accepted is http(s)://HOST or http(s)://HOST/PATH");
   }
-  static const std::regex kCountry("[a-z]{2}|other");
+  static const std::regex kCountry("[a-z]{2}");
   if (!std::regex_match(options.feed_country, kCountry)) {
     throw Error("feed_country is '" + options.feed_country +
-                "', accepted are two lower-case letters (ISO 3166-1) or other");
+                "', accepted are two lower-case letters (ISO 3166-1), zz for none");
   }
 }
 

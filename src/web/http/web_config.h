@@ -37,7 +37,7 @@ struct WebConfig {
   /// feeds begin with it. Empty: what the request says of its host, by http.
   std::string public_url;
   std::string feed_publisher;               ///< Who publishes the feeds; empty: the title.
-  std::string feed_country = "other";       ///< Of the publisher, "us"; "other": not said.
+  std::string feed_country = "zz";          ///< Of the publisher, "us"; "zz": not said.
   geo::GeoPoint centre{40.4433, -79.9436};  ///< Where an empty map looks.
   /// Other origins than the server's own whose pages may open the live stream, "https://host:port".
   std::vector<std::string> allowed_origins;

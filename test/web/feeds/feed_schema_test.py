@@ -276,7 +276,7 @@ class Feeds(unittest.TestCase):
         self.assertTrue(datex_profile().validate(etree.fromstring(text.encode())))
         for old, new in (("latitude>40", "latitude>140"), ("riskOf", "maybe"), ("probable", "maybe"), ("certain", "maybe"),
                          ('modelBaseVersion="3"', 'modelBaseVersion="2"'), ("sit:GeneralObstruction", "sit:Accident"),
-                         ("wildAnimalsOnTheRoad", "deer"), ("<sit:safetyRelatedMessage>true</sit:safetyRelatedMessage>", ""),
+                         ("wildAnimalsOnTheRoad", "deer"), ("country>zz<", "country>other<"), ("<sit:safetyRelatedMessage>true</sit:safetyRelatedMessage>", ""),
                          ("sit:validity>", "sit:Validity>"), ("sit:commentType>", "com:commentType>")):
             if old in text:
                 wrong = etree.fromstring(text.replace(old, new).encode())
