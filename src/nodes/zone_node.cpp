@@ -27,6 +27,7 @@ constexpr std::chrono::milliseconds kPatience{500};
 constexpr std::chrono::milliseconds kTellPause{50};
 /// After a failed commit; the vehicles send the reports again anyway.
 constexpr std::chrono::seconds kStorePause{1};
+constexpr std::int64_t kStoreCheckNs = 1'000'000'000;
 
 zone::ZoneInbox::Config InboxLimits(const ros_io::ZoneCloudletConfig& config) {
   zone::ZoneInbox::Config limits;
@@ -273,6 +274,7 @@ void ZoneNode::WorkUntilClosed() {
     }
     telling = TellVehicles(std::move(batch.orders));
     HandleAnswers(batch.answers);
+    CheckStore();
     LetTimePass();
     if (!batch.map_changes.empty()) CommitMapChanges(batch.map_changes);
     if (!batch.reports.empty()) CommitReports(batch.reports);
@@ -338,6 +340,25 @@ void ZoneNode::HandleAnswers(const std::deque<protocol::PollAnswer>& answers) {
       ROS_ERROR_THROTTLE(kSayAgainS, "an answer of '%.64s' is not counted: %s",
                          answer.vehicle_id.c_str(), error.what());
     }
+  }
+}
+
+/// So that whoever asks whether the zone is ready knows it while no report comes, too.
+void ZoneNode::CheckStore() {
+  const std::int64_t now_ns = SteadyNs();
+  if (now_ns - store_checked_ns_ < kStoreCheckNs) return;
+  store_checked_ns_ = now_ns;
+  try {
+    zone_.CheckStore();
+    // A commit that failed for another reason stays told until one succeeds.
+    if (!is_store_away_) return;
+    is_store_away_ = false;
+    Count([](ros_io::ZoneCloudletCounters& counters) { counters.store_error.clear(); });
+  } catch (const Error& error) {
+    is_store_away_ = true;
+    Count(
+        [&error](ros_io::ZoneCloudletCounters& counters) { counters.store_error = error.what(); });
+    ROS_ERROR_THROTTLE(kSayAgainS, "%s", error.what());
   }
 }
 

@@ -75,6 +75,7 @@ class ZoneNode {
   void RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence);
   bool TellVehicles(std::deque<zone::CatchUpOrder> orders);
   void HandleAnswers(const std::deque<protocol::PollAnswer>& answers);
+  void CheckStore();
   void LetTimePass();
   template <typename Change>
   void Count(const Change& change);
@@ -94,6 +95,8 @@ class ZoneNode {
   NoticePictures pictures_;
   std::unique_ptr<CatchUpPublisher> teller_;  ///< The worker's.
   std::int64_t advanced_ns_ = 0;              ///< The worker's: when time last passed, steady.
+  std::int64_t store_checked_ns_ = 0;         ///< The worker's, steady.
+  bool is_store_away_ = false;                ///< The worker's: what the last check found.
   std::unique_ptr<NoticeSender> notices_;
   std::atomic<bool> view_changed_{true};
   ros::Publisher receipt_publisher_;

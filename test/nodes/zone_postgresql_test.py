@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """The zone_cloudlet node with its store in a real server of PostgreSQL, which is killed, and so is the node."""
 
+import json
 import os
 import shutil
 import signal
@@ -9,6 +10,8 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.error
+import urllib.request
 import uuid
 
 import rospy
@@ -55,7 +58,7 @@ class ZonePostgresqlTest(unittest.TestCase):
         self.addCleanup(self.stop)
 
     def start(self):
-        self.process = subprocess.Popen([program("livemap", "zone_cloudlet"), "__name:=zone_cloudlet", "_web:=false",
+        self.process = subprocess.Popen([program("livemap", "zone_cloudlet"), "__name:=zone_cloudlet", "_web_port:=0",
                                          f"_directory:={self.directory}/zone", f"_store_url:={self.url}",
                                          "_max_speed_mps:=10000.0"], start_new_session=True)
         eventually(lambda: self.reports.get_num_connections() == 1 and self.receipts.get_num_connections() == 1,
@@ -76,6 +79,25 @@ class ZonePostgresqlTest(unittest.TestCase):
             for report in unanswered():
                 self.reports.publish(report)
             time.sleep(0.5)
+
+    def ask_readiness(self):
+        """Status and body of /readyz."""
+        port = rospy.get_param("/livemap/web_port")
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=PATIENCE_S) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as refusal:
+            return refusal.code, json.load(refusal)
+
+    def test_a_zone_that_hears_of_nothing_knows_that_its_server_is_away_and_that_it_is_back(self):
+        eventually(lambda: self.ask_readiness() == (200, {"status": "ready"}), "the zone is ready")
+        for how in (signal.SIGINT, signal.SIGKILL):
+            self.server.kill(how)
+            status, answer = eventually(lambda: [a for a in [self.ask_readiness()] if a[0] != 200], "not ready")[0]
+            self.assertEqual(status, 503)
+            self.assertIn("the store does not answer", answer["error"])
+            self.server.start()
+            eventually(lambda: self.ask_readiness()[0] == 200, "ready again")
 
     def count(self, table):
         return int(self.server.ask("zone", f"SELECT count(*) FROM {table}"))

@@ -297,7 +297,7 @@ HttpResponse Api::Metrics() const {
 HttpResponse Api::Readiness() const {
   if (!zone_.IsActive()) return MakeBusyAnswer("the zone's lease was not renewed in time");
   if (zone_.IsStoreWell()) return JsonAnswer({{"status", "ready"}});
-  return MakeBusyAnswer("the store does not keep what is written");
+  return MakeBusyAnswer("the store does not answer, or does not keep what is written");
 }
 
 HttpResponse Api::Vehicles() const {

@@ -25,6 +25,8 @@ constexpr std::size_t kMaxDecisionsForFrame = 1000;
 constexpr std::size_t kMaxPicturesAtOnce = 100;
 /// Of which vehicles the outboxes count: they tell their places about once a second.
 constexpr double kOutboxAgesS = 60;
+/// Longer than a commit takes on a busy machine.
+constexpr std::int64_t kStorePatienceNs = 5'000'000'000;
 /// Between two pieces: a lock that is taken again at once lets nobody in.
 constexpr std::chrono::milliseconds kPause{2};
 
@@ -203,6 +205,23 @@ void ZoneService::Advance() {
   if (config_.picture_days > 0) {
     images_.RemoveOlder(now_ns_() - Nanoseconds(config_.picture_days * 86400), kMaxPicturesAtOnce);
   }
+}
+
+void ZoneService::CheckStore() {
+  const MutexLock writer(writer_mutex_);
+  ZoneStore& store = StateForWriter().store;
+  AskStore([&] {
+    if (store_well_) {
+      store.Ping();
+    } else {
+      store.TryWrite();
+    }
+  });
+}
+
+bool ZoneService::IsStoreWell() const {
+  const std::int64_t asked_ns = store_asked_ns_;
+  return store_well_ && (asked_ns == 0 || SteadyNs() - asked_ns < kStorePatienceNs);
 }
 
 void ZoneService::LetHazardsAge() {

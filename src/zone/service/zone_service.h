@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/clock.h"
 #include "common/histogram.h"
 #include "common/mutex.h"
 #include "common/sqlite.h"
@@ -238,6 +239,11 @@ class ZoneService : public MapReader {
   /// transitions that are due, and forgets where vehicles were too long ago. To be called about
   /// once a second. Throws StoreError: then what failed has not happened, and is tried again.
   void Advance();
+  /// Looks whether the store can be used: by a question, and where it did not keep or answer the
+  /// last time by a transaction that changes nothing. IsStoreWell says so from then on. To be
+  /// called about once a second, so that it is known when nobody writes. Throws StoreError: it
+  /// cannot be used.
+  void CheckStore();
 
   /// File of a stored picture; only 64 lower-case hex digits name one.
   std::optional<std::string> ImagePath(const std::string& sha256) const;
@@ -266,8 +272,9 @@ class ZoneService : public MapReader {
   /// Of the newest event that drivers were told; 0 without one. As Sequence.
   std::uint64_t AnnouncedSequence() const { return announced_; }
   ZoneStatistics Statistics() const;
-  /// Whether the store kept the newest transaction; true before the first one.
-  bool IsStoreWell() const { return store_well_; }
+  /// Whether the store kept the newest transaction and answered the newest CheckStore, and has left
+  /// neither without an answer for 5 s; true before the first one. Waits for nothing.
+  bool IsStoreWell() const;
   /// Under which the zone writes; null: no other process waits to take over.
   const ZoneLease* lease() const { return config_.lease.get(); }
   /// Whether this process may speak for the zone: false while its lease may be another's.
@@ -295,6 +302,9 @@ class ZoneService : public MapReader {
   /// Runs the transaction and counts a failure of the store.
   template <typename Body>
   void Commit(ZoneTransaction& transaction, const Body& body) REQUIRES(writer_mutex_, data_mutex_);
+  /// Notes whether the store could be used for `body`.
+  template <typename Body>
+  void AskStore(const Body& body) REQUIRES(writer_mutex_);
   /// What follows from a committed transaction: the pictures' references, when its hazards change
   /// and are asked about next, and events for subscribers.
   void FollowUp(const ZoneTransaction& transaction) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
@@ -358,6 +368,7 @@ class ZoneService : public MapReader {
   std::array<std::atomic<std::uint64_t>, kRefusalKinds> positions_refused_{};
   std::atomic<std::uint64_t> store_errors_{0};
   std::atomic<bool> store_well_{true};
+  std::atomic<std::int64_t> store_asked_ns_{0};  ///< SteadyNs; 0: it owes no answer.
   DurationHistogram commit_times_;
   DurationHistogram report_ages_;
 
@@ -376,15 +387,30 @@ class ZoneService : public MapReader {
 };
 
 template <typename Body>
-void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
+void ZoneService::AskStore(const Body& body) {
+  store_asked_ns_ = SteadyNs();
   try {
-    transaction.Run(body);
+    body();
   } catch (const StoreError&) {
-    ++store_errors_;
     store_well_ = false;
+    store_asked_ns_ = 0;
+    throw;
+  } catch (...) {
+    store_asked_ns_ = 0;
     throw;
   }
   store_well_ = true;
+  store_asked_ns_ = 0;
+}
+
+template <typename Body>
+void ZoneService::Commit(ZoneTransaction& transaction, const Body& body) {
+  try {
+    AskStore([&] { transaction.Run(body); });
+  } catch (const StoreError&) {
+    ++store_errors_;
+    throw;
+  }
   sequence_ = StateForReaders().sequence;
   announced_ = StateForReaders().announced;
 }

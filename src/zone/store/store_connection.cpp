@@ -1,12 +1,15 @@
 #include "zone/store/store_connection.h"
 
 #include <libpq-fe.h>
+#include <poll.h>
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <chrono>
 #include <memory>
 #include <utility>
 
@@ -17,6 +20,8 @@ namespace livemap::zone {
 namespace {
 
 constexpr int kOldestPostgresql = 120000;
+/// Of a ping, which waits for no disk.
+constexpr std::chrono::milliseconds kPingPatience{2000};
 
 struct FreeResult {
   void operator()(PGresult* result) const { PQclear(result); }
@@ -176,8 +181,67 @@ void StoreConnection::SetUpPostgresql(Use use) {
 
 bool StoreConnection::IsLost() const {
   if (!is_postgresql_) return false;
+  if (is_given_up_) return true;
   auto& session = const_cast<soci::session&>(session_);  // SOCI has no const access.
   return PQstatus(ConnectionOf(session)) != CONNECTION_OK;
+}
+
+void StoreConnection::Ping() {
+  Flush();
+  if (is_postgresql_) {
+    PingServer();
+  } else {
+    PingFile();
+  }
+}
+
+/// Not by SOCI, which waits as long as it takes.
+void StoreConnection::PingServer() {
+  PGconn* connection = ConnectionOf(session_);
+  const auto end = std::chrono::steady_clock::now() + kPingPatience;
+  if (PQsendQuery(connection, "SELECT pg_is_in_recovery()") != 1) {
+    throw StoreError(std::string("store: the server is not asked: ") + PQerrorMessage(connection));
+  }
+  while (PQisBusy(connection) == 1) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    pollfd answer{PQsocket(connection), POLLIN, 0};
+    if (left.count() <= 0 || poll(&answer, 1, static_cast<int>(left.count())) == 0) {
+      is_given_up_ = true;
+      // Statements that are ended with the session ask the server once more, and wait for ever.
+      shutdown(PQsocket(connection), SHUT_RDWR);
+      throw StoreError("store: the server has not answered within " +
+                       std::to_string(kPingPatience.count()) + " ms");
+    }
+    if (PQconsumeInput(connection) != 1) break;
+  }
+  std::string error;
+  bool only_reads = false;
+  for (;;) {
+    const PostgresqlResult result(PQgetResult(connection));
+    if (result == nullptr) break;
+    if (PQresultStatus(result.get()) != PGRES_TUPLES_OK) {
+      error = PQresultErrorMessage(result.get());
+    } else {
+      only_reads = *PQgetvalue(result.get(), 0, 0) == 't';
+    }
+  }
+  if (error.empty() && IsLost()) error = "the connection to the server is lost";
+  if (!error.empty()) throw StoreError("store: the server does not answer: " + error);
+  if (only_reads) throw StoreError("store: the server is a replica that only reads");
+}
+
+/// What is written to a file without a name is lost.
+void StoreConnection::PingFile() {
+  auto* file = static_cast<soci::sqlite3_session_backend*>(session_.get_backend())->conn_;
+  int has_moved = 0;
+  if (sqlite_api::sqlite3_file_control(file, "main", SQLITE_FCNTL_HAS_MOVED, &has_moved) ==
+          SQLITE_OK &&
+      has_moved != 0) {
+    throw StoreError("store: the database's file was moved or removed");
+  }
+  int version = 0;
+  session_ << "PRAGMA schema_version", soci::into(version);
 }
 
 std::string StoreConnection::TakeNextName() { return "livemap_" + std::to_string(++names_); }

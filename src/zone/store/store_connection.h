@@ -64,6 +64,10 @@ class StoreConnection {
   void Discard() { queued_.clear(); }
   /// Whether the connection to the server has broken. SQLite's never does.
   bool IsLost() const;
+  /// Asks the database for as little as can be. Throws StoreError, and soci_error: the server does
+  /// not answer within 2 s, after which the connection is lost, or only reads (a replica); or
+  /// SQLite's file was moved or removed. Not to be called in a transaction.
+  void Ping();
 
  private:
   friend class WriteStatement;
@@ -78,12 +82,15 @@ class StoreConnection {
   void SetUpPostgresql(Use use);
   std::string TakeNextName();
   std::string SendQueued();
+  void PingServer();
+  void PingFile();
 
   bool is_postgresql_;
   Dialect dialect_;
   soci::session session_;
   std::deque<QueuedWrite> queued_;
   std::size_t names_ = 0;
+  bool is_given_up_ = false;  ///< An answer did not come, and would be taken for another one.
 };
 
 /// A statement that returns no rows, made ready once and run often. Its text has a name with a

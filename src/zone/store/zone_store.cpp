@@ -178,6 +178,11 @@ class ZoneStore::Implementation {
     return body(writer());
   }
 
+  /// Asks once: after a connection that broke meanwhile, the next call connects anew.
+  void Ping() {
+    ExplainStore("asking the database", [&] { writer().connection.Ping(); });
+  }
+
   void Begin() {
     Read([](Writer& writer) {
       ExplainStore("beginning a transaction", [&] {
@@ -584,6 +589,24 @@ bool ZoneStore::EmptyLog() {
         soci::into(log_pages), soci::into(moved_pages);
     return busy == 0;
   });
+}
+
+void ZoneStore::Ping() { implementation_->Ping(); }
+
+void ZoneStore::TryWrite() {
+  Begin();
+  try {
+    StoreConnection& connection = implementation_->writer().connection;
+    // PostgreSQL's commits count themselves.
+    if (!connection.is_postgresql()) {
+      ExplainStore("trying to write",
+                   [&] { connection.session() << "UPDATE livemap_schema SET version = version"; });
+    }
+    Commit();
+  } catch (...) {
+    Rollback();
+    throw;
+  }
 }
 
 int ZoneStore::SchemaVersion() { return kZoneSchemaVersion; }

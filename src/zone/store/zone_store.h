@@ -228,6 +228,13 @@ class ZoneStore {
   /// server's, which writes over it in time.
   bool EmptyLog();
 
+  /// Asks the database for as little as can be. Throws StoreError when it does not answer within
+  /// 2 s, when it only reads, or when SQLite's file was moved or removed. Not to be called in a
+  /// transaction, nor is TryWrite.
+  void Ping();
+  /// Commits a transaction that changes nothing. Throws StoreError when that is not kept.
+  void TryWrite();
+
   /// The schema that this program writes.
   static int SchemaVersion();
 

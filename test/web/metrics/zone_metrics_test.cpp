@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,6 +16,7 @@
 #include "common/sqlite.h"
 #include "test/web/http/http_client.h"
 #include "test/web/zone_fixture.h"
+#include "test/zone/postgresql_server.h"
 #include "web/metrics/metrics_text.h"
 #include "web/server/web_server.h"
 
@@ -153,6 +156,53 @@ TEST_F(ZoneMetricsTest, TheZoneIsReadyWhileItsStoreKeepsWhatIsWritten) {
   saboteur.Execute("DROP TRIGGER no_space");
   fixture_.AddRow("pothole", {40.44, -79.94}, 1);
   EXPECT_EQ(Get(server_.port(), "/readyz").status, 200);
+}
+
+TEST_F(ZoneMetricsTest, AZoneWhoseFileIsGoneIsNotReadyUntilItIsBack) {
+  const std::string elsewhere = fixture_.database() + ".elsewhere";
+  std::filesystem::rename(fixture_.database(), elsewhere);
+  EXPECT_THROW(fixture_.zone->CheckStore(), StoreError);
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 503);
+  std::filesystem::rename(elsewhere, fixture_.database());
+  fixture_.zone->CheckStore();
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 200);
+}
+
+TEST_F(ZoneMetricsTest, AZoneIsReadyAgainOnceAWriteIsKeptAlsoWithoutAReport) {
+  SqliteDatabase saboteur(fixture_.database(), true);
+  saboteur.Execute(
+      "CREATE TRIGGER no_space BEFORE UPDATE ON livemap_schema BEGIN SELECT RAISE(ABORT, 'full'); "
+      "END");
+  saboteur.Execute(
+      "CREATE TRIGGER no_event BEFORE INSERT ON events BEGIN SELECT RAISE(ABORT, 'full'); END");
+  fixture_.zone->CheckStore();
+  EXPECT_THROW(fixture_.AddRow("pothole", {40.44, -79.94}, 1), StoreError);
+  EXPECT_THROW(fixture_.zone->CheckStore(), StoreError);
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 503);
+  saboteur.Execute("DROP TRIGGER no_space");
+  fixture_.zone->CheckStore();
+  EXPECT_EQ(Get(server_.port(), "/readyz").status, 200);
+}
+
+TEST(ZoneReadinessTest, WithoutItsServerOfPostgresqlAZoneIsNotReadyUntilThatIsBack) {
+  if (!test::PostgresqlServer::IsInstalled()) GTEST_SKIP() << "skipped, no PostgreSQL server";
+  test::PostgresqlServer postgresql;
+  const ZoneFixture fixture(nullptr, "", postgresql.MakeDatabase());
+  const WebServer server(TestOptions(), *fixture.zone, fixture.catalogue);
+  fixture.zone->CheckStore();
+  EXPECT_EQ(Get(server.port(), "/readyz").status, 200);
+  for (const int how : {SIGINT, SIGKILL}) {
+    postgresql.Kill(how);
+    EXPECT_THROW(fixture.zone->CheckStore(), StoreError);
+    EXPECT_THROW(fixture.zone->CheckStore(), StoreError);
+    const HttpResult answer = Get(server.port(), "/readyz");
+    EXPECT_EQ(answer.status, 503);
+    EXPECT_THAT(std::string(answer.Json()["error"]), HasSubstr("the store does not answer"));
+    EXPECT_THAT(answer.body, Not(HasSubstr("livemap@"))) << "strangers do not learn where it is";
+    postgresql.Start();
+    fixture.zone->CheckStore();
+    EXPECT_EQ(Get(server.port(), "/readyz").status, 200);
+  }
 }
 
 TEST(MetricsTextTest, EscapesValuesOfLabels) {

@@ -196,6 +196,25 @@ TEST_F(PostgresqlStoreTest, AHistoryIsReadAgainAfterTheServerWasKilled) {
   EXPECT_EQ(zone.Events(hazard, 10).size(), 1U);
 }
 
+TEST_F(PostgresqlStoreTest, AServerThatStandsStillIsNotWaitedForAndUsedAgainOnceItGoesOn) {
+  ZoneService zone(OnServer(), Clock(), 1);
+  zone.CheckStore();
+  const auto writer = static_cast<pid_t>(StoreProbe(url_).Number(
+      "SELECT a.pid FROM pg_stat_activity a JOIN pg_locks l ON l.pid = a.pid WHERE l.locktype = "
+      "'advisory' AND a.datname = current_database()"));
+  ASSERT_EQ(kill(writer, SIGSTOP), 0);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_THROW(zone.CheckStore(), StoreError);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20)) << "2 s and load";
+  EXPECT_FALSE(zone.IsStoreWell());
+  EXPECT_THROW(zone.CheckStore(), StoreError) << "the server still has the other connection";
+  ASSERT_EQ(kill(writer, SIGCONT), 0);
+  zone.CheckStore();
+  EXPECT_TRUE(zone.IsStoreWell());
+  zone.Handle(MakeReport());
+  ExpectConsistent(1);
+}
+
 TEST_F(PostgresqlStoreTest, ADatabaseThatAnotherZoneHasIsRefused) {
   ZoneService zone(OnServer(), Clock(), 1);
   EXPECT_THAT(WhyNotStarted(OnServer("other")), AllOf(HasSubstr("in use"), HasSubstr(url_)));
