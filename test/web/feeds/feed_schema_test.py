@@ -47,8 +47,12 @@ def json_profile(name):
     return jsonschema.Draft7Validator(json.loads((PROFILES / name).read_text()), format_checker=CHECKS)
 
 
+def xml_profile(name):
+    return etree.XMLSchema(etree.parse(str(PROFILES / name)))
+
+
 def datex_profile():
-    return etree.XMLSchema(etree.parse(str(PROFILES / "datex_payload.xsd")))
+    return xml_profile("datex_payload.xsd")
 
 
 def json_schema(url):
@@ -281,9 +285,17 @@ class Feeds(unittest.TestCase):
             if old in text:
                 wrong = etree.fromstring(text.replace(old, new).encode())
                 self.assertFalse(datex_profile().validate(wrong), f"DATEX II with {new} for {old}")
+        for name, profile, old, new in (("atom", "atom.xsd", "point>40", "point>140"), ("atom", "atom.xsd", "<published>", "<published>on "),
+                                        ("atom", "atom.xsd", "summary>", "content>"), ("gpx", "gpx.xsd", 'lat="40', 'lat="140'),
+                                        ("gpx", "gpx.xsd", "wpt", "waypoint"), ("gpx", "gpx.xsd", 'version="1.1"', 'version="1.0"')):
+            text = self.get("feeds/hazards." + name).decode()
+            self.assertIn(old, text)
+            wrong = etree.fromstring(text.replace(old, new).encode())
+            self.assertFalse(xml_profile(profile).validate(wrong), f"{name} with {new} for {old}")
 
     def test_georss(self):
         root = etree.fromstring(self.get("feeds/hazards.atom"))
+        xml_profile("atom.xsd").assertValid(root)
         for tag in ("id", "title", "updated", "author"):
             self.assertEqual(len(root.findall(ATOM + tag)), 1, tag)
         entries = root.findall(ATOM + "entry")
@@ -297,6 +309,7 @@ class Feeds(unittest.TestCase):
 
     def test_gpx(self):
         root = etree.fromstring(self.get("feeds/hazards.gpx"))
+        xml_profile("gpx.xsd").assertValid(root)
         self.assertEqual((root.tag, root.get("version")), (GPX + "gpx", "1.1"))
         points = root.findall(GPX + "wpt")
         self.assertEqual(len(points), 10)
