@@ -137,6 +137,9 @@ TEST(Validate, NamesTheBadOption) {
   }
   options.web_root = LIVEMAP_SOURCE_DIR "/web";
   EXPECT_NO_THROW(Validate(options));
+  options.feed_country = "other";  // DATEX II version 3 takes two letters.
+  EXPECT_THROW(Validate(options), Error);
+  options.feed_country = "us";
   options.port = 70000;
   EXPECT_THROW(Validate(options), Error);
 }
