@@ -91,6 +91,8 @@ def vehicle_rights(zone):
             f"pattern read {vehicle}/receipt",
             f"pattern read {vehicle}/change_receipt",
             f"pattern read {vehicle}/notice",
+            f"pattern write {vehicle}/cell_request",
+            f"pattern read {vehicle}/cell_hazards",
             f"pattern read {vehicle}/poll",
             f"pattern read {vehicle}/directory"]
 

@@ -34,14 +34,18 @@ def rights(zone, revoked):
         f"topic read {prefix}/vehicle/+/change",
         f"topic write {prefix}/vehicle/+/receipt",
         f"topic write {prefix}/vehicle/+/change_receipt",
+        f"topic read {prefix}/vehicle/+/cell_request",
         f"topic write {prefix}/vehicle/+/notice",
+        f"topic write {prefix}/vehicle/+/cell_hazards",
         f"topic write {prefix}/vehicle/+/poll",
         f"topic write {prefix}/vehicle/+/directory",
         f"topic write {prefix}/notice",
+        f"topic write {prefix}/notice/+",
         "",
         *denied,
         *vehicle_rights(zone),
         f"pattern read {prefix}/notice",
+        f"pattern read {prefix}/notice/+",
         "",
     ])
 

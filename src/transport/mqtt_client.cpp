@@ -9,7 +9,9 @@
 #include <cmath>
 #include <csignal>
 #include <map>
+#include <set>
 #include <thread>
+#include <utility>
 
 #include "common/error.h"
 #include "common/mutex.h"
@@ -97,6 +99,20 @@ class MqttClient::Connection {
     return MqttPublishStatus::kQueued;
   }
 
+  void Follow(std::vector<std::string> topics, int qos) {
+    if (qos != 0 && qos != 1) {
+      throw Error("MQTT QoS of topics to be followed is " + std::to_string(qos) +
+                  ", accepted are 0 and 1");
+    }
+    {
+      const MutexLock lock(mutex_);
+      followed_ = {topics.begin(), topics.end()};
+      followed_qos_ = qos;
+      follows_others_ = true;
+    }
+    wake_.Signal();
+  }
+
   bool connected() const {
     const MutexLock lock(mutex_);
     return statistics_.connected;
@@ -175,6 +191,7 @@ class MqttClient::Connection {
 
   void Serve() {
     while (!stopping_) {
+      if (logged_in_) SubscribeToFollowed();
       if (logged_in_) SendQueued();
       const int fd = mosquitto_socket(handle_.get());
       if (fd < 0) return;
@@ -194,6 +211,61 @@ class MqttClient::Connection {
         return;
       }
     }
+  }
+
+  /// Tells the broker what has changed in the topics of Follow.
+  void SubscribeToFollowed() {
+    std::set<std::string> wanted;
+    int qos = 0;
+    {
+      const MutexLock lock(mutex_);
+      if (!follows_others_) return;
+      follows_others_ = false;
+      wanted = followed_;
+      qos = followed_qos_;
+    }
+    for (auto topic = asked_.begin(); topic != asked_.end();) {
+      if (wanted.count(*topic) != 0) {
+        ++topic;
+        continue;
+      }
+      mosquitto_unsubscribe_v5(handle_.get(), nullptr, topic->c_str(), nullptr);
+      topic = asked_.erase(topic);
+    }
+    for (const std::string& topic : wanted) {
+      if (!asked_.insert(topic).second) continue;
+      int id = 0;
+      mosquitto_subscribe_v5(handle_.get(), &id, topic.c_str(), qos, 0, nullptr);
+      asking_[id] = topic;
+    }
+    // Also where nothing is new: who has just asked wants to know.
+    TellFollowed(true);
+  }
+
+  /// Which of the asked ones are granted, if that has changed.
+  void TellFollowed(bool always = false) {
+    std::vector<std::string> granted;
+    for (const std::string& topic : asked_) {
+      if (granted_.count(topic) != 0) granted.push_back(topic);
+    }
+    granted_ = {granted.begin(), granted.end()};
+    if (!always && granted == told_granted_) return;
+    told_granted_ = std::move(granted);
+    if (!callbacks_.on_followed) return;
+    Guarded(this, [](Connection& connection) {
+      connection.callbacks_.on_followed(connection.told_granted_);
+    });
+  }
+
+  /// Of a session of before: neither this client's subscriptions nor its followed topics have it.
+  bool IsUnasked(const char* topic) const {
+    if (asked_.count(topic) != 0) return false;
+    for (const MqttSubscription& subscription : subscriptions_) {
+      bool matches = false;
+      const int code = mosquitto_topic_matches_sub(subscription.filter.c_str(), topic, &matches);
+      if (code != MOSQ_ERR_SUCCESS || matches) return false;
+    }
+    return true;
   }
 
   /// Keeps the library's own unbounded queue empty: at most max_inflight messages are with it.
@@ -259,6 +331,9 @@ class MqttClient::Connection {
 
   void EndConnection() {
     logged_in_ = false;
+    asked_.clear();
+    asking_.clear();
+    TellFollowed();
     Explain("the connection to the broker was lost");
     {
       const MutexLock lock(mutex_);
@@ -285,6 +360,10 @@ class MqttClient::Connection {
       statistics_.connected = true;
       ++statistics_.connections;
     }
+    {
+      const MutexLock lock(mutex_);
+      follows_others_ = !followed_.empty();
+    }
     for (const MqttSubscription& subscription : subscriptions_) {
       mosquitto_subscribe_v5(handle_.get(), nullptr, subscription.filter.c_str(), subscription.qos,
                              0, nullptr);
@@ -292,7 +371,16 @@ class MqttClient::Connection {
     if (callbacks_.on_connection) callbacks_.on_connection(true, "");
   }
 
-  void HandleSubscribe(int count, const int* granted) {
+  void HandleSubscribe(int id, int count, const int* granted) {
+    CountSubscribed(count, granted);
+    const auto asking = asking_.find(id);
+    if (asking == asking_.end()) return;
+    if (count == 1 && granted[0] < MQTT_RC_UNSPECIFIED) granted_.insert(asking->second);
+    asking_.erase(asking);
+    TellFollowed();
+  }
+
+  void CountSubscribed(int count, const int* granted) {
     const MutexLock lock(mutex_);
     for (int i = 0; i < count; ++i) {
       if (granted[i] < MQTT_RC_UNSPECIFIED) {
@@ -324,6 +412,9 @@ class MqttClient::Connection {
       ++statistics_.received;
       statistics_.received_bytes += received.topic.size() + received.payload.size;
     }
+    if (IsUnasked(message.topic)) {
+      mosquitto_unsubscribe_v5(handle_.get(), nullptr, message.topic, nullptr);
+    }
     if (callbacks_.on_message) callbacks_.on_message(received);
   }
 
@@ -354,9 +445,9 @@ class MqttClient::Connection {
                         const mosquitto_property*) {
     Guarded(self, [=](Connection& connection) { connection.HandlePublish(id, reason_code); });
   }
-  static void OnSubscribe(mosquitto*, void* self, int, int count, const int* granted,
+  static void OnSubscribe(mosquitto*, void* self, int id, int count, const int* granted,
                           const mosquitto_property*) {
-    Guarded(self, [=](Connection& connection) { connection.HandleSubscribe(count, granted); });
+    Guarded(self, [=](Connection& connection) { connection.HandleSubscribe(id, count, granted); });
   }
   static void OnMessage(mosquitto*, void* self, const mosquitto_message* message,
                         const mosquitto_property*) {
@@ -381,6 +472,9 @@ class MqttClient::Connection {
 
   mutable Mutex mutex_;
   MqttStatistics statistics_ GUARDED_BY(mutex_);
+  std::set<std::string> followed_ GUARDED_BY(mutex_);
+  int followed_qos_ GUARDED_BY(mutex_) = 1;
+  bool follows_others_ GUARDED_BY(mutex_) = false;  ///< The broker does not know yet.
 
   // Thread side.
   std::vector<MqttAddress> brokers_;
@@ -388,6 +482,10 @@ class MqttClient::Connection {
   MosquittoHandle handle_;
   Backoff backoff_;
   std::map<int, MqttPublishOutcome> inflight_;  ///< By packet id.
+  std::set<std::string> asked_;                 ///< Of the topics of Follow, on this connection.
+  std::map<int, std::string> asking_;           ///< Not answered yet, by packet id.
+  std::set<std::string> granted_;
+  std::vector<std::string> told_granted_;
   bool logged_in_ = false;
   std::string loss_reason_;
   std::string tls_error_;  ///< Of this attempt, in OpenSSL's words.
@@ -405,6 +503,10 @@ MqttClient::~MqttClient() = default;
 MqttPublishStatus MqttClient::Publish(std::string topic, std::vector<std::uint8_t> payload, int qos,
                                       std::uint64_t tag) {
   return connection_->Publish({std::move(topic), std::move(payload), qos, tag});
+}
+
+void MqttClient::Follow(std::vector<std::string> topics, int qos) {
+  connection_->Follow(std::move(topics), qos);
 }
 
 bool MqttClient::connected() const { return connection_->connected(); }

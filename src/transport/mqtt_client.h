@@ -91,6 +91,9 @@ struct MqttCallbacks {
   /// After the broker accepted the login (true), and after the connection was lost (false, with the
   /// sentence that says why). A refused attempt is a `false` as well.
   std::function<void(bool connected, const std::string& reason)> on_connection;
+  /// Of the topics of MqttClient::Follow, those that the broker has granted on this connection,
+  /// sorted: after each call of Follow, and whenever they are others than before.
+  std::function<void(const std::vector<std::string>& topics)> on_followed;
 };
 
 enum class MqttPublishStatus {
@@ -138,6 +141,13 @@ class MqttClient {
   /// Never blocks on the network. Throws Error when `qos` is neither 0 nor 1.
   MqttPublishStatus Publish(std::string topic, std::vector<std::uint8_t> payload, int qos,
                             std::uint64_t tag);
+
+  /// Subscribes to these topics with this QoS beside the client's subscriptions, and no longer to
+  /// those of the last call; on every connection from now on. From any thread, also from callbacks.
+  /// What the broker sends of a topic that nobody asked for, as a session of an earlier process
+  /// has, is handed on once, and not subscribed to any more. Throws Error when `qos` is neither 0
+  /// nor 1.
+  void Follow(std::vector<std::string> topics, int qos);
 
   bool connected() const;
   MqttStatistics statistics() const;

@@ -11,6 +11,7 @@ constexpr std::size_t kMaxIdBytes = 64;
 constexpr std::size_t kMaxTemplateBytes = 1024;
 constexpr std::string_view kZone = "{zone}";
 constexpr std::string_view kVehicle = "{vehicle}";
+constexpr std::string_view kCell = "{cell}";
 
 bool IsTopicIdCharacter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
@@ -56,13 +57,13 @@ TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
   }
   levels_ = SplitTopicLevels(text);
   const auto wrong = std::find_if(levels_.begin(), levels_.end(), [](const std::string& level) {
-    return level != kZone && level != kVehicle && !IsPlainTopicLevel(level);
+    return level != kZone && level != kVehicle && level != kCell && !IsPlainTopicLevel(level);
   });
   if (wrong != levels_.end()) {
     throw Error("MQTT topic template '" + text + "' has the level '" + *wrong +
-                "', accepted are {zone}, {vehicle} and characters of A-Z a-z 0-9 . _ -");
+                "', accepted are {zone}, {vehicle}, {cell} and characters of A-Z a-z 0-9 . _ -");
   }
-  for (const std::string_view placeholder : {kZone, kVehicle}) {
+  for (const std::string_view placeholder : {kZone, kVehicle, kCell}) {
     if (std::count(levels_.begin(), levels_.end(), placeholder) > 1) {
       throw Error("MQTT topic template '" + text + "' has " + std::string(placeholder) +
                   " more than once");
@@ -70,15 +71,18 @@ TopicTemplate::TopicTemplate(const std::string& text) : text_(text) {
   }
   has_zone_ = std::count(levels_.begin(), levels_.end(), kZone) == 1;
   has_vehicle_ = std::count(levels_.begin(), levels_.end(), kVehicle) == 1;
+  has_cell_ = std::count(levels_.begin(), levels_.end(), kCell) == 1;
 }
 
-std::string TopicTemplate::Expand(const TopicNames& names) const { return Fill(names, false); }
+std::string TopicTemplate::Expand(const TopicNames& names) const {
+  return Fill(names, false, false);
+}
 
 std::string TopicTemplate::SubscriptionFilter(const TopicNames& names) const {
-  return Fill(names, names.vehicle.empty());
+  return Fill(names, names.vehicle.empty(), names.cell.empty());
 }
 
-std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle) const {
+std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle, bool any_cell) const {
   std::string topic;
   for (const std::string& level : levels_) {
     if (!topic.empty()) topic += '/';
@@ -86,6 +90,8 @@ std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle) const
       topic += RequireTopicId(names.zone, "zone", text_);
     } else if (level == kVehicle) {
       topic += any_vehicle ? "+" : RequireTopicId(names.vehicle, "vehicle", text_);
+    } else if (level == kCell) {
+      topic += any_cell ? "+" : RequireTopicId(names.cell, "cell", text_);
     } else {
       topic += level;
     }
@@ -95,14 +101,17 @@ std::string TopicTemplate::Fill(const TopicNames& names, bool any_vehicle) const
 
 std::optional<TopicNames> TopicTemplate::Match(std::string_view topic) const {
   // The longest topic that can match is every placeholder filled to its limit.
-  if (topic.size() > kMaxTemplateBytes + 2 * kMaxIdBytes) return std::nullopt;
+  if (topic.size() > kMaxTemplateBytes + 3 * kMaxIdBytes) return std::nullopt;
   const std::vector<std::string> levels = SplitTopicLevels(topic);
   if (levels.size() != levels_.size()) return std::nullopt;
   TopicNames names;
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    if (levels_[i] == kZone || levels_[i] == kVehicle) {
+    if (levels_[i] == kZone || levels_[i] == kVehicle || levels_[i] == kCell) {
       if (!IsValidId(levels[i])) return std::nullopt;
-      (levels_[i] == kZone ? names.zone : names.vehicle) = levels[i];
+      std::string& name = levels_[i] == kZone      ? names.zone
+                          : levels_[i] == kVehicle ? names.vehicle
+                                                   : names.cell;
+      name = levels[i];
     } else if (levels[i] != levels_[i]) {
       return std::nullopt;
     }

@@ -42,6 +42,10 @@ class Log {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (!connected) losses_.push_back(reason);
     };
+    callbacks.on_followed = [this](const std::vector<std::string>& topics) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      followed_ = topics;
+    };
     return callbacks;
   }
 
@@ -53,6 +57,10 @@ class Log {
     const std::lock_guard<std::mutex> lock(mutex_);
     return outcomes_;
   }
+  std::vector<std::string> followed() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return followed_;
+  }
   std::vector<std::string> losses() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return losses_;
@@ -63,6 +71,7 @@ class Log {
   std::set<std::string> payloads_;
   std::vector<MqttPublishOutcome> outcomes_;
   std::vector<std::string> losses_;
+  std::vector<std::string> followed_;
 };
 
 MqttConfig Login(const BrokerProcess& broker, const std::string& user) {
@@ -340,6 +349,61 @@ TEST(MqttClientOptions, RefusesValuesThatItCannotKeep) {
   refuses([](MqttConfig& options) { options.reconnect_min_s = 0; });
   refuses([](MqttConfig& options) { options.reconnect_max_s = 0.1; });
   refuses([](MqttConfig& options) { options.tls = MqttTlsConfig{"/no/ca.pem", "", ""}; });
+}
+
+using Topics = std::vector<std::string>;
+
+TEST_F(MqttClientTest, HearsOfTheTopicsThatItFollowsAndNoLongerOfThoseOfBefore) {
+  const std::string cells = "livemap/v1/test/notice/";
+  MqttClient car(Login(broker_, "car-1"), {}, car_log_.Callbacks());
+  car.Follow({cells + "1", cells + "2"}, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.followed() == Topics{cells + "1", cells + "2"}; }));
+  MqttClient zone(Login(broker_, "zone"), {}, zone_log_.Callbacks());
+  zone.Publish(cells + "1", Bytes("first"), 1, 1);
+  zone.Publish(cells + "3", Bytes("far away"), 1, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.payloads().count("first") == 1; }));
+  car.Follow({cells + "2", cells + "3"}, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.followed() == Topics{cells + "2", cells + "3"}; }));
+  zone.Publish(cells + "1", Bytes("behind"), 1, 1);
+  zone.Publish(cells + "3", Bytes("near now"), 1, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.payloads().count("near now") == 1; }));
+  EXPECT_EQ(car_log_.payloads(), (std::set<std::string>{"first", "near now"}));
+}
+
+TEST_F(MqttClientTest, FollowsAgainAfterTheBrokerWasLost) {
+  const std::string topic = "livemap/v1/test/notice/1";
+  MqttClient car(Login(broker_, "car-1"), {}, car_log_.Callbacks());
+  car.Follow({topic}, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.followed() == Topics{topic}; }));
+  broker_.Kill();
+  ASSERT_TRUE(Eventually([&] { return car_log_.followed().empty(); }));
+  broker_.LoseState();
+  broker_.Start();
+  ASSERT_TRUE(Eventually([&] { return car_log_.followed() == Topics{topic}; }));
+  MqttClient zone(Login(broker_, "zone"), {}, zone_log_.Callbacks());
+  zone.Publish(topic, Bytes("again"), 1, 1);
+  EXPECT_TRUE(Eventually([&] { return car_log_.payloads().count("again") == 1; }));
+}
+
+TEST_F(MqttClientTest, LeavesTheTopicsThatAnEarlierProcessFollowed) {
+  const std::string topic = "livemap/v1/test/notice/1";
+  MqttClient zone(Login(broker_, "zone"), {}, zone_log_.Callbacks());
+  {
+    MqttClient before(Login(broker_, "car-1"), {}, zone_log_.Callbacks());
+    before.Follow({topic}, 1);
+    ASSERT_TRUE(Eventually([&] { return zone_log_.followed() == Topics{topic}; }));
+  }
+  MqttClient car(Login(broker_, "car-1"), {}, car_log_.Callbacks());
+  ASSERT_TRUE(Eventually([&] { return car.connected(); }));
+  // The first one makes it leave.
+  zone.Publish(topic, Bytes("first"), 1, 1);
+  ASSERT_TRUE(Eventually([&] { return car_log_.payloads().count("first") == 1; }));
+  EXPECT_TRUE(Eventually([&] {
+    const std::size_t before = zone_log_.outcomes().size();
+    zone.Publish(topic, Bytes("again"), 1, 1);
+    Eventually([&] { return zone_log_.outcomes().size() > before; });
+    return zone_log_.outcomes().back().has_no_listener();
+  }));
 }
 
 }  // namespace

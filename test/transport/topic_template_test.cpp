@@ -39,6 +39,21 @@ TEST(TopicTemplate, MatchesNothingElse) {
   EXPECT_FALSE(report.Match(std::string(100000, '/')));
 }
 
+TEST(TopicTemplate, HasALevelForACell) {
+  const TopicTemplate notice("livemap/v1/{zone}/notice/{cell}");
+  EXPECT_TRUE(notice.has_cell());
+  EXPECT_FALSE(TopicTemplate(kReport).has_cell());
+  EXPECT_EQ(notice.Expand({"demo", "", "0123"}), "livemap/v1/demo/notice/0123");
+  EXPECT_EQ(notice.SubscriptionFilter({"demo", "", ""}), "livemap/v1/demo/notice/+");
+  const auto names = notice.Match("livemap/v1/demo/notice/0123");
+  ASSERT_TRUE(names);
+  EXPECT_EQ(names->zone, "demo");
+  EXPECT_EQ(names->cell, "0123");
+  EXPECT_FALSE(notice.Match("livemap/v1/demo/notice"));
+  EXPECT_THROW(notice.Expand({"demo", "", "+"}), Error);
+  EXPECT_THROW(notice.Expand({"demo", "", ""}), Error);
+}
+
 TEST(TopicTemplate, RefusesToExpandNamesThatWouldReachOtherTopics) {
   const TopicTemplate report(kReport);
   for (const std::string id : {"+", "#", "a/b", "", "..", "a b", "x\n"}) {

@@ -17,8 +17,10 @@ from zone_fixture import NOTICE, Zone, free_port, livemap_zone, topic
 MAX_MESSAGE_BYTES = 1 << 20
 GRANTED_QOS_1 = 1
 # What a vehicle tells the zone on its own topics, and hears from it.
-WRITTEN = ("report", "position", "answer", "change")
-HEARD = ("receipt", "notice", "poll", "change_receipt", "directory")
+WRITTEN = ("report", "position", "answer", "change", "cell_request")
+HEARD = ("receipt", "notice", "poll", "change_receipt", "directory", "cell_hazards")
+# What it hears of one cell of the map.
+CELL_NOTICE = NOTICE + "/120210233222021"
 
 
 class NoOneInTest(unittest.TestCase):
@@ -60,6 +62,17 @@ class NoOneInTest(unittest.TestCase):
             self.assertEqual(car.receive(), Message(topic("car-1", name), b"yours"))
         self.assertEqual(zone.publish(NOTICE, b"all"), 0)
         self.assertEqual(car.receive(), Message(NOTICE, b"all"))
+
+    def test_a_vehicle_hears_of_the_cells_that_it_wants_to_hear_of_and_tells_nothing_there(self):
+        zone, car, other = self.connect("zone"), self.connect("car-1"), self.connect("car-2")
+        self.assertEqual(car.subscribe(CELL_NOTICE), GRANTED_QOS_1)
+        self.assertEqual(other.subscribe(CELL_NOTICE[:-1] + "3"), GRANTED_QOS_1)
+        self.assertEqual(other.publish(CELL_NOTICE, b"invented"), NOT_AUTHORIZED)
+        self.assertEqual(car.publish(CELL_NOTICE, b"invented"), NOT_AUTHORIZED)
+        self.assertEqual(zone.publish(CELL_NOTICE, b"near"), 0)
+        self.assertEqual(car.receive(), Message(CELL_NOTICE, b"near"))
+        self.assertEqual(zone.publish(CELL_NOTICE[:-1] + "3", b"elsewhere"), 0)
+        self.assertEqual(other.receive(), Message(CELL_NOTICE[:-1] + "3", b"elsewhere"))
 
     def test_anothers_topic_is_not_authorized_and_nothing_arrives(self):
         zone, car = self.listening_zone(), self.connect("car-1")
