@@ -12,8 +12,8 @@ constexpr std::size_t kMaxWaitingForPictures = 8;
 
 }  // namespace
 
-NoticeSender::NoticeSender(NoticePictures& pictures, const ros::Publisher& publisher)
-    : all_pictures_(pictures), publisher_(publisher) {
+NoticeSender::NoticeSender(NoticePictures& pictures, const Publishers& publishers)
+    : all_pictures_(pictures), publishers_(publishers) {
   thread_ = std::thread([this] { Work(); });
 }
 
@@ -26,10 +26,10 @@ NoticeSender::~NoticeSender() {
   thread_.join();
 }
 
-void NoticeSender::Push(const zone::HazardEvent& event) {
+void NoticeSender::Push(const zone::HazardEvent& event, std::vector<zone::CellLog::Step> steps) {
   {
     const MutexLock lock(mutex_);
-    events_.push_back(event);
+    events_.push_back({event, std::move(steps)});
   }
   changed_.NotifyOne();
 }
@@ -39,26 +39,43 @@ void NoticeSender::Work() {
   while (true) {
     while (!closing_ && events_.empty()) changed_.Wait(mutex_);
     if (events_.empty()) return;
-    const zone::HazardEvent event = std::move(events_.front());
+    const News news = std::move(events_.front());
     events_.pop_front();
     const bool with_picture = !closing_ && events_.size() < kMaxWaitingForPictures;
     lock.Unlock();
-    Send(event, with_picture);
+    Send(news, with_picture);
     lock.Lock();
   }
 }
 
-void NoticeSender::Send(const zone::HazardEvent& event, bool with_picture) {
-  HazardNotice notice = ros_io::ToMessage(event);
+void NoticeSender::Send(const News& news, bool with_picture) {
+  HazardNotice notice = ros_io::ToMessage(news.event);
   if (with_picture && notice.action == HazardNotice::ADDED) {
-    notice.image.data = all_pictures_.Get(event.hazard.image_sha256);
+    notice.image.data = all_pictures_.Get(news.event.hazard.image_sha256);
     if (!notice.image.data.empty()) {
       notice.image.format = "jpeg";
       ++pictures_;
     }
   }
-  publisher_.publish(notice);
+  // An empty publisher cannot be asked to publish.
+  if (publishers_.all) publishers_.all.publish(notice);
+  for (const zone::CellLog::Step& step : news.steps) SendToCell(notice, step);
   ++sent_;
+}
+
+/// The cell follows from the notice's place, so one that tells of a hazard's leaving has a place in
+/// the cell that was left.
+void NoticeSender::SendToCell(HazardNotice notice, const zone::CellLog::Step& step) const {
+  notice.previous_sequence = step.previous;
+  if (step.leaves) {
+    const geo::GeoPoint middle = step.cell.Middle();
+    notice.action = HazardNotice::REMOVED;
+    notice.latitude = middle.latitude_deg;
+    notice.longitude = middle.longitude_deg;
+    notice.image.format.clear();
+    notice.image.data.clear();
+  }
+  publishers_.cells.publish(notice);
 }
 
 }  // namespace livemap::nodes

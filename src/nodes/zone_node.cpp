@@ -1,5 +1,6 @@
 #include "nodes/zone_node.h"
 
+#include <livemap/CellHazards.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/ReportReceipt.h>
@@ -11,6 +12,7 @@
 
 #include "common/clock.h"
 #include "common/time.h"
+#include "ros/conversions/cell_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 #include "streets/address_file.h"
@@ -66,8 +68,10 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       zone_(config_.zone, SystemNs, EntropySeededGenerator()()),
       inbox_(InboxLimits(config_)),
       catch_up_(config_.catch_up),
+      cell_allowance_({}),
       map_changes_(node, zone_, inbox_),
       pictures_(zone_, static_cast<std::size_t>(config_.notice_picture_bytes)),
+      cells_(zone_.AnnouncedSequence()),
       updater_(node, private_node) {
   {
     const MutexLock lock(mutex_);
@@ -79,14 +83,19 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   }
   receipt_publisher_ = node.advertise<ReportReceipt>("hazard/receipt", 20000);
   poll_publisher_ = node.advertise<HazardPoll>("hazard/poll", 1000);
-  notices_ = std::make_unique<NoticeSender>(pictures_,
-                                            node.advertise<HazardNotice>("hazard/notice", 20000));
+  NoticeSender::Publishers publishers;
+  if (config_.notices_to_all) publishers.all = node.advertise<HazardNotice>("hazard/notice", 20000);
+  publishers.cells = node.advertise<HazardNotice>("hazard/cell_notice", 20000);
+  notices_ = std::make_unique<NoticeSender>(pictures_, publishers);
   CatchUpPublisher::Config telling;
   telling.radius_m = config_.catch_up.radius_m;
   telling.max_hazards = static_cast<std::size_t>(config_.join_max_hazards);
   telling.picture_bytes = static_cast<std::size_t>(config_.join_picture_bytes);
   teller_ = std::make_unique<CatchUpPublisher>(
       zone_, pictures_, node.advertise<HazardNotice>("hazard/vehicle_notice", 20000), telling);
+  cell_teller_ = std::make_unique<CellPublisher>(
+      zone_, cells_, node.advertise<CellHazards>("hazard/cell_hazards", 20000));
+  RestoreCells();
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (!config_.work_orders.empty()) {
     orders_ = std::make_unique<orders::OrderDesk>(
@@ -115,6 +124,7 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
       node.subscribe("hazard/report", 2000, &ZoneNode::OnReport, this),
       node.subscribe("vehicle/position", 2000, &ZoneNode::OnPosition, this),
       node.subscribe("hazard/poll_answer", 1000, &ZoneNode::OnAnswer, this),
+      node.subscribe("hazard/cell_request", 2000, &ZoneNode::OnCellRequest, this),
   };
   SayReady();
   const zone::StoreDamage damage = zone_.Statistics().store_damage;
@@ -134,6 +144,22 @@ void ZoneNode::FollowNeighbours() {
                                  from.margin_m, from.ask_every_s},
       zone_, config_.zone.catalogue, SystemNs,
       [](const std::string& line) { ROS_INFO("neighbours: %s", line.c_str()); });
+}
+
+/// The cells of the hazards that drivers know already.
+void ZoneNode::RestoreCells() {
+  constexpr std::size_t kHazardsOfPage = 1000;
+  zone::Walk<zone::HazardState> walk{std::nullopt, {}, 0, UINT64_MAX};
+  for (bool is_last = false; !is_last;) {
+    const zone::Page<zone::Hazard> page = zone_.ReadHazards(walk, kHazardsOfPage);
+    for (const zone::Hazard& hazard : page.items) {
+      if (zone::IsTold(hazard.state) && hazard.announced_sequence > 0) {
+        cells_.Restore(hazard.uuid, hazard.position, hazard.announced_sequence);
+      }
+    }
+    walk.after = page.sequence;
+    is_last = page.is_last;
+  }
 }
 
 /// One line for whoever waits for it in a terminal or a log file.
@@ -232,12 +258,36 @@ void ZoneNode::OnAnswer(const HazardPollAnswer& message) {
   }
 }
 
+/// What is dropped here the vehicle asks again.
+void ZoneNode::OnCellRequest(const CellRequest& message) {
+  if (!zone_.IsActive()) return;
+  try {
+    protocol::CellRequest request = ros_io::FromMessage(message);
+    const std::int64_t now_ns = SteadyNs();
+    {
+      const MutexLock lock(mutex_);
+      if (!cell_allowance_.Take(request.vehicle_id, request.cells.size(), now_ns)) {
+        ++counters_.cell_requests_refused;
+        return;
+      }
+      catch_up_.NoteCellRequest(request.vehicle_id, now_ns);
+    }
+    if (inbox_.Push(std::move(request))) return;
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.cell_requests_refused; });
+  } catch (const Error& error) {
+    Count([](ros_io::ZoneCloudletCounters& counters) { ++counters.cell_requests_malformed; });
+    ROS_WARN_THROTTLE(kSayAgainS, "cell request of '%.64s' dropped: %s", message.vehicle_id.c_str(),
+                      error.what());
+  }
+}
+
 /// A vehicle that is new, moved far or missed announcements: the worker tells it.
 void ZoneNode::RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence) {
   const std::uint64_t announced = zone_.AnnouncedSequence();
   const MutexLock lock(mutex_);
   auto order =
       catch_up_.Update(vehicle.vehicle_id, vehicle.position, map_sequence, announced, SteadyNs());
+  if (catch_up_.TakeInvitation(vehicle.vehicle_id)) cell_teller_->Invite(vehicle.vehicle_id);
   if (!order) return;
   ++(order->since == 0 ? counters_.vehicles_joined : counters_.vehicles_behind);
   inbox_.Push(std::move(*order));
@@ -258,7 +308,10 @@ void ZoneNode::OnEvent(const zone::ZoneEvent& event) {
     if (origin) SetMap(*origin);
     if (event.vehicle) paths_.Add(*event.vehicle);
   }
-  if (event.hazard && event.hazard->announced) notices_->Push(*event.hazard);
+  if (!event.hazard || !event.hazard->announced) return;
+  const zone::Hazard& hazard = event.hazard->hazard;
+  notices_->Push(*event.hazard, cells_.Announce(hazard.uuid, hazard.position,
+                                                zone::IsTold(hazard.state), hazard.sequence));
 }
 
 void ZoneNode::WorkUntilClosed() {
@@ -272,7 +325,8 @@ void ZoneNode::WorkUntilClosed() {
       telling = false;
       continue;
     }
-    telling = TellVehicles(std::move(batch.orders));
+    const bool tells_vehicles = TellVehicles(std::move(batch.orders));
+    telling = TellCells(std::move(batch.cell_requests)) || tells_vehicles;
     HandleAnswers(batch.answers);
     CheckStore();
     LetTimePass();
@@ -329,6 +383,16 @@ bool ZoneNode::TellVehicles(std::deque<zone::CatchUpOrder> orders) {
   if (told) catch_up_.Told(*told, SteadyNs());
   counters_.vehicle_notices_sent = teller_->notices();
   return teller_->busy();
+}
+
+/// Answers the next portion of what vehicles ask about cells; true while there is more.
+bool ZoneNode::TellCells(std::deque<protocol::CellRequest> requests) {
+  for (protocol::CellRequest& request : requests) cell_teller_->Add(std::move(request));
+  cell_teller_->PublishBatch();
+  const MutexLock lock(mutex_);
+  counters_.cells_told = cell_teller_->cells();
+  counters_.cell_hazards_told = cell_teller_->hazards();
+  return cell_teller_->busy();
 }
 
 void ZoneNode::HandleAnswers(const std::deque<protocol::PollAnswer>& answers) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <livemap/CellRequest.h>
 #include <livemap/HazardPollAnswer.h>
 #include <livemap/HazardReport.h>
 #include <livemap/VehiclePosition.h>
@@ -19,6 +20,7 @@
 
 #include "common/mutex.h"
 #include "nodes/catch_up_publisher.h"
+#include "nodes/cell_publisher.h"
 #include "nodes/map_change_receiver.h"
 #include "nodes/notice_sender.h"
 #include "orders/desk/order_desk.h"
@@ -27,7 +29,9 @@
 #include "ros/parameters/zone_cloudlet_parameters.h"
 #include "web/server/web_server.h"
 #include "zone/inbox/catch_up_planner.h"
+#include "zone/inbox/cell_allowance.h"
 #include "zone/inbox/zone_inbox.h"
+#include "zone/registry/cell_log.h"
 #include "zone/registry/map_origin.h"
 #include "zone/service/erasure_desk.h"
 #include "zone/service/zone_service.h"
@@ -57,6 +61,7 @@ class ZoneNode {
   void OnReport(const HazardReportConstPtr& message);
   void OnPosition(const VehiclePosition& message);
   void OnAnswer(const HazardPollAnswer& message);
+  void OnCellRequest(const CellRequest& message);
   void OnEvent(const zone::ZoneEvent& event);
   void OnMarkerTimer(const ros::SteadyTimerEvent&);
   void OnDiagnosticsTimer(const ros::SteadyTimerEvent&);
@@ -74,6 +79,8 @@ class ZoneNode {
   void NoteFailedCommit(const Error& error);
   void RecordNewReports(const zone::VehicleState& vehicle, std::uint64_t map_sequence);
   bool TellVehicles(std::deque<zone::CatchUpOrder> orders);
+  bool TellCells(std::deque<protocol::CellRequest> requests);
+  void RestoreCells();
   void HandleAnswers(const std::deque<protocol::PollAnswer>& answers);
   void CheckStore();
   void LetTimePass();
@@ -90,13 +97,16 @@ class ZoneNode {
   std::optional<geo::LocalFrame> map_ GUARDED_BY(mutex_);
   zone::MapOrigin origin_ GUARDED_BY(mutex_);
   zone::CatchUpPlanner catch_up_ GUARDED_BY(mutex_);
+  zone::CellAllowance cell_allowance_ GUARDED_BY(mutex_);
 
   MapChangeReceiver map_changes_;
   NoticePictures pictures_;
-  std::unique_ptr<CatchUpPublisher> teller_;  ///< The worker's.
-  std::int64_t advanced_ns_ = 0;              ///< The worker's: when time last passed, steady.
-  std::int64_t store_checked_ns_ = 0;         ///< The worker's, steady.
-  bool is_store_away_ = false;                ///< The worker's: what the last check found.
+  zone::CellLog cells_;
+  std::unique_ptr<CatchUpPublisher> teller_;    ///< The worker's.
+  std::unique_ptr<CellPublisher> cell_teller_;  ///< The worker's.
+  std::int64_t advanced_ns_ = 0;                ///< The worker's: when time last passed, steady.
+  std::int64_t store_checked_ns_ = 0;           ///< The worker's, steady.
+  bool is_store_away_ = false;                  ///< The worker's: what the last check found.
   std::unique_ptr<NoticeSender> notices_;
   std::atomic<bool> view_changed_{true};
   ros::Publisher receipt_publisher_;

@@ -2,10 +2,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/uuid.h"
+#include "geo/map_cell.h"
 #include "geo/wgs84.h"
 
 namespace livemap::protocol {
@@ -15,9 +17,12 @@ struct Notice {
   enum class Action { kAdded, kUpdated, kRemoved, kCaughtUp };
   Action action = Action::kAdded;
   std::uint64_t sequence = 0;  ///< Of the zone's event log, strictly increasing.
-  /// To everybody: of the announcement before; 0: there was none. With kCaughtUp: where the telling
+  /// To everybody: of the announcement before, in `cell` where there is one; 0: there was none.
+  /// With kCaughtUp: where the telling
   /// began, see HazardNotice.msg.
   std::uint64_t previous_sequence = 0;
+  /// To the vehicles of this cell alone; none: to everybody, or to the addressee.
+  std::optional<geo::MapCell> cell;
   std::string vehicle_id;     ///< Addressee; empty: everybody.
   Uuid hazard_uuid;           ///< Nil with kCaughtUp.
   std::int64_t stamp_ns = 0;  ///< When the zone decided, zone clock (UTC).

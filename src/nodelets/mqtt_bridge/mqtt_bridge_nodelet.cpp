@@ -1,3 +1,4 @@
+#include <livemap/VehicleCells.h>
 #include <livemap/VehicleZones.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <std_msgs/Bool.h>
@@ -29,6 +30,7 @@
 #include "nodelets/nodelet_part.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/bridge/bridged_type.h"
+#include "ros/conversions/cell_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/parameters/mqtt_bridge_parameters.h"
 #include "transport/mqtt_client.h"
@@ -56,6 +58,9 @@ constexpr char kDirectoryTopic[] = "livemap/v1/{zone}/vehicle/{vehicle}/director
 /// decides by the vehicle's position. It writes the zone into each message that comes in, and sends
 /// a message to the zone in it; without one to the present zone. A zone with a zone directory gives
 /// it to each vehicle that it hears; the vehicle puts what is newer into its own file.
+///
+/// A topic with a level {cell} is one topic for each cell of the map. A zone sends a message to the
+/// cell of its place; a vehicle hears of the cells that it is told to, and says of which it does.
 ///
 /// Of a zone with a standby only the bridge beside the active process is connected: the broker
 /// keeps one session of the zone's login, with what waits in it, for whichever of the two connects.
@@ -110,6 +115,7 @@ class MqttBridgePart : public NodeletPart {
     zone_timer_.stop();
     handout_timer_.stop();
     active_subscriber_.shutdown();
+    cells_subscriber_.shutdown();
     for (ros::Subscriber& subscriber : position_subscribers_) subscriber.shutdown();
     for (const auto& topic : topics_) topic->subscriber.shutdown();
     connections_.reset();
@@ -126,6 +132,9 @@ class MqttBridgePart : public NodeletPart {
     for (const ros_io::BridgeTopic& topic : config_.topics) {
       topics_.push_back(std::make_unique<Topic>(topic));
     }
+    if (!IsZone()) {
+      cells_publisher_ = getNodeHandle().advertise<VehicleCells>("vehicle/cells_heard", 20);
+    }
     // Publishers stand before a client can call, the clients before subscribers can.
     AdvertiseIncoming();
     if (IsZone() && !config_.zones.directory.empty()) StartHandout();
@@ -137,6 +146,7 @@ class MqttBridgePart : public NodeletPart {
     } else {
       connections_->Keep({ConfiguredZone()});
     }
+    FollowCells();
     SubscribeOutgoing();
     diagnostics_ = std::make_unique<Diagnostics>(
         getNodeHandle(), getPrivateNodeHandle(),
@@ -159,6 +169,7 @@ class MqttBridgePart : public NodeletPart {
     std::vector<transport::MqttSubscription> subscriptions;
     for (const auto& topic : topics_) {
       if (topic->config.direction != ros_io::BridgeDirection::kIn) continue;
+      if (topic->mqtt_topic.has_cell()) continue;  // FollowCells.
       subscriptions.push_back({topic->mqtt_topic.SubscriptionFilter(names), topic->config.qos});
     }
     if (FollowsZones()) subscriptions.push_back({directory_topic_.SubscriptionFilter(names), 1});
@@ -179,9 +190,64 @@ class MqttBridgePart : public NodeletPart {
       // A broker that was killed may have lost what it had for vehicles.
       if (connected && handout_) handout_->TakeBackAll();
     };
+    events.on_followed = [this](const std::string& zone, const std::vector<std::string>& topics) {
+      TellCellsHeard(zone, topics);
+    };
     connections_ = std::make_unique<ZoneConnections>(
         config_.mqtt, [this](const std::string& zone) { return SubscriptionsOf(zone); },
         std::move(events));
+  }
+
+  /// The topics with a level for the cell that a vehicle takes in.
+  std::vector<const Topic*> CellTopics() const {
+    std::vector<const Topic*> topics;
+    for (const auto& topic : topics_) {
+      const bool is_in = topic->config.direction == ros_io::BridgeDirection::kIn;
+      if (is_in && topic->mqtt_topic.has_cell()) topics.push_back(topic.get());
+    }
+    return topics;
+  }
+
+  void FollowCells() {
+    if (IsZone() || CellTopics().empty()) return;
+    cells_subscriber_ =
+        getNodeHandle().subscribe("vehicle/cells", 1, &MqttBridgePart::OnCells, this);
+  }
+
+  /// The cells of which the vehicle wants to hear, from all zones.
+  void OnCells(const VehicleCells& message) {
+    std::vector<geo::MapCell> cells;
+    try {
+      cells = ros_io::FromMessage(message);
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+      return;
+    }
+    const std::vector<const Topic*> topics = CellTopics();
+    const auto topics_of = [this, cells, topics](const std::string& zone) {
+      std::vector<std::string> names;
+      for (const Topic* topic : topics) {
+        for (const geo::MapCell& cell : cells) {
+          names.push_back(topic->mqtt_topic.Expand({zone, config_.user, cell.Quadkey()}));
+        }
+      }
+      return names;
+    };
+    connections_->Follow(topics_of, topics.front()->config.qos);
+  }
+
+  /// Of which cells the broker of `zone` lets the vehicle hear now; on its client's thread.
+  void TellCellsHeard(const std::string& zone, const std::vector<std::string>& topics) {
+    const std::vector<const Topic*> cell_topics = CellTopics();
+    if (cell_topics.empty()) return;
+    std::vector<geo::MapCell> cells;
+    for (const std::string& topic : topics) {
+      // Where there are several topics of a cell, the first one tells.
+      const auto names = cell_topics.front()->mqtt_topic.Match(topic);
+      const auto cell = names ? geo::MapCell::FromQuadkey(names->cell) : std::nullopt;
+      if (cell) cells.push_back(*cell);
+    }
+    cells_publisher_.publish(ros_io::ToMessage(cells, zone));
   }
 
   bool FollowsZones() const { return !IsZone() && !config_.zones.directory.empty(); }
@@ -435,6 +501,9 @@ class MqttBridgePart : public NodeletPart {
     if (topic.mqtt_topic.has_vehicle() && !transport::IsValidId(vehicle)) {
       return Refuse(topic, "the addressee '" + vehicle + "' is no vehicle id");
     }
+    if (topic.mqtt_topic.has_cell() && message.cell.empty()) {
+      return Refuse(topic, "the message has no valid place, so it belongs to no cell");
+    }
     // Also of a process that stood still together with the timer.
     if (!IsActive()) {
       ++topic.dropped;
@@ -448,8 +517,8 @@ class MqttBridgePart : public NodeletPart {
       return;
     }
     const transport::MqttPublishStatus status =
-        client->Publish(topic.mqtt_topic.Expand({zone, vehicle}), std::move(message.envelope),
-                        topic.config.qos, index);
+        client->Publish(topic.mqtt_topic.Expand({zone, vehicle, message.cell}),
+                        std::move(message.envelope), topic.config.qos, index);
     if (status != transport::MqttPublishStatus::kQueued) ++topic.dropped;
   }
 
@@ -627,6 +696,8 @@ class MqttBridgePart : public NodeletPart {
   std::int64_t active_ns_ = 0;  ///< BootNs of the last word that the zone is active; 0: it is not.
   bool was_active_ = false;
   ros::Publisher zones_publisher_;
+  ros::Publisher cells_publisher_;    ///< Of a vehicle.
+  ros::Subscriber cells_subscriber_;  ///< Of a vehicle that hears of cells.
   std::vector<ros::Subscriber> position_subscribers_;
   ros::SteadyTimer zone_timer_;
   std::unique_ptr<ZoneConnections> connections_;

@@ -51,6 +51,7 @@ void ZoneConnections::Keep(const std::vector<Zone>& zones) {
 void ZoneConnections::Connect(const std::string& zone, Connection& connection) const {
   try {
     connection.client = MakeClient(zone, connection.brokers);
+    if (followed_of_) connection.client->Follow(followed_of_(zone), followed_qos_);
     connection.fault.clear();
   } catch (const Error& error) {
     if (connection.fault == error.what()) return;
@@ -78,8 +79,22 @@ std::unique_ptr<transport::MqttClient> ZoneConnections::MakeClient(
       events_.on_connection(id, connected, reason);
     };
   }
+  if (events_.on_followed) {
+    callbacks.on_followed = [this, id = zone](const std::vector<std::string>& topics) {
+      events_.on_followed(id, topics);
+    };
+  }
   return std::make_unique<transport::MqttClient>(config, subscriptions_of_(zone),
                                                  std::move(callbacks));
+}
+
+void ZoneConnections::Follow(std::function<std::vector<std::string>(const std::string&)> topics_of,
+                             int qos) {
+  followed_of_ = std::move(topics_of);
+  followed_qos_ = qos;
+  for (const auto& [zone, connection] : connections_) {
+    if (connection.client) connection.client->Follow(followed_of_(zone), qos);
+  }
 }
 
 transport::MqttClient* ZoneConnections::Find(const std::string& zone) const {

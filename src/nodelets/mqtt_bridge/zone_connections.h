@@ -34,6 +34,8 @@ class ZoneConnections {
     std::function<void(const transport::MqttPublishOutcome&)> on_published;
     std::function<void(const std::string& zone, bool connected, const std::string& reason)>
         on_connection;
+    std::function<void(const std::string& zone, const std::vector<std::string>& topics)>
+        on_followed;
   };
 
   /// What a connection to the zone with this id subscribes to.
@@ -50,6 +52,10 @@ class ZoneConnections {
   /// file that is gone) is told by on_connection, takes nothing from the others, and is tried again
   /// at the next call.
   void Keep(const std::vector<Zone>& zones);
+
+  /// Every connection, also one that is made later, follows these topics, which `topics_of` names
+  /// for the zone with this id, as MqttClient::Follow.
+  void Follow(std::function<std::vector<std::string>(const std::string&)> topics_of, int qos);
 
   /// The connection to a zone; null: there is none.
   transport::MqttClient* Find(const std::string& zone) const;
@@ -72,6 +78,8 @@ class ZoneConnections {
   const transport::MqttConfig config_;
   const SubscriptionsOf subscriptions_of_;
   const Events events_;
+  std::function<std::vector<std::string>(const std::string&)> followed_of_;
+  int followed_qos_ = 1;
   std::map<std::string, Connection> connections_;
   std::vector<std::future<void>> ending_;  ///< Last: what ends still calls events_.
 };

@@ -1,6 +1,8 @@
 #include "ros/bridge/bridged_type.h"
 
 #include <livemap/CandidateFrame.h>
+#include <livemap/CellHazards.h>
+#include <livemap/CellRequest.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
@@ -16,6 +18,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "geo/map_cell.h"
 
 namespace livemap::ros_io {
 namespace {
@@ -30,6 +33,13 @@ template <typename Message, typename = void>
 struct HasZone : std::false_type {};
 template <typename Message>
 struct HasZone<Message, std::void_t<decltype(std::declval<Message&>().zone)>> : std::true_type {};
+
+template <typename Message, typename = void>
+struct HasPlace : std::false_type {};
+template <typename Message>
+struct HasPlace<Message, std::void_t<decltype(std::declval<Message&>().latitude),
+                                     decltype(std::declval<Message&>().longitude)>>
+    : std::true_type {};
 
 /// Of a serialised text before its characters.
 constexpr std::size_t kTextLengthBytes = 4;
@@ -50,6 +60,7 @@ class TypedBridge : public BridgedType {
                     ros::message_traits::definition<Message>(), max_bytes, limits, earlier) {}
 
   bool has_vehicle_id() const override { return HasVehicleId<Message>::value; }
+  bool has_place() const override { return HasPlace<Message>::value; }
 
   ros::Subscriber Subscribe(ros::NodeHandle& handle, const std::string& topic,
                             std::uint32_t queue_size, Send send) const override {
@@ -59,6 +70,10 @@ class TypedBridge : public BridgedType {
           OutgoingBridgeMessage outgoing;
           if constexpr (HasVehicleId<Message>::value) outgoing.vehicle_id = message->vehicle_id;
           if constexpr (HasZone<Message>::value) outgoing.zone = message->zone;
+          if constexpr (HasPlace<Message>::value) {
+            const geo::GeoPoint place{message->latitude, message->longitude};
+            if (geo::IsValid(place)) outgoing.cell = geo::MapCell::At(place).Quadkey();
+          }
           const std::vector<std::uint8_t> serialised = Serialise(*message);
           outgoing.fault = Check({serialised.data(), serialised.size()});
           if (!outgoing.fault) outgoing.envelope = Enclose(serialised, outgoing.zone.size());
@@ -115,6 +130,8 @@ std::pair<const std::string, Factory> BridgedTypeEntry(
 const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
       BridgedTypeEntry<CandidateFrame>("", {"image.data"}),
+      BridgedTypeEntry<CellHazards>("83fa272e40c3f88a9c695865cbe9209e"),
+      BridgedTypeEntry<CellRequest>("eceb8c87685360e56aeb929ad7c324e1"),
       BridgedTypeEntry<HazardNotice>("88d23041ceb511154d96daa5ff718aef", {"image.data"}),
       BridgedTypeEntry<HazardPoll>("78c6f168c0bc4ed892e7fbea24487d70", {},
                                    {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),

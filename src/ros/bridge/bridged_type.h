@@ -20,6 +20,8 @@ struct OutgoingBridgeMessage {
   std::vector<std::uint8_t> envelope;
   std::string vehicle_id;  ///< The message's own field; empty where the type has none.
   std::string zone;        ///< The same of the field `zone`, which the envelope does not have.
+  /// Quadkey of the cell in which the message's place lies; empty where it has no valid one.
+  std::string cell;
   /// Why every receiver would refuse the message (a field over its limit); it has no envelope then.
   std::optional<std::string> fault;
 };
@@ -58,6 +60,8 @@ class BridgedType {
   const std::string& name() const { return name_; }
   /// Whether the type has a field `vehicle_id` for the sender or the addressee.
   virtual bool has_vehicle_id() const = 0;
+  /// Whether the type has a place, fields `latitude` and `longitude`.
+  virtual bool has_place() const = 0;
 
   /// Hands every message on `topic` to `send`, in its envelope.
   virtual ros::Subscriber Subscribe(ros::NodeHandle& handle, const std::string& topic,

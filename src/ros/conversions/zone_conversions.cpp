@@ -216,6 +216,10 @@ void DescribeZone(const ZoneCloudletCounters& counters, const zone::ZoneStatisti
   status.add("reports_of_unknown_class", statistics.of_unknown_class);
   status.add("vehicles_joined", counters.vehicles_joined);
   status.add("vehicles_behind", counters.vehicles_behind);
+  status.add("cells_told", counters.cells_told);
+  status.add("cell_hazards_told", counters.cell_hazards_told);
+  status.add("cell_requests_refused", counters.cell_requests_refused);
+  status.add("cell_requests_malformed", counters.cell_requests_malformed);
   status.add("image_bytes", statistics.image_bytes);
   for (std::size_t i = 0; i < zone::kPictureRefusals; ++i) {
     status.add(std::string("pictures_refused_") +

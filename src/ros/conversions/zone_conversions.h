@@ -51,6 +51,10 @@ struct ZoneCloudletCounters {
   std::uint64_t notices_sent = 0;  ///< To everybody.
   std::uint64_t notice_pictures = 0;
   std::uint64_t notice_pictures_failed = 0;
+  std::uint64_t cell_requests_refused = 0;  ///< More than the vehicle may ask, or too many wait.
+  std::uint64_t cell_requests_malformed = 0;
+  std::uint64_t cells_told = 0;  ///< To one vehicle each.
+  std::uint64_t cell_hazards_told = 0;
   std::uint64_t vehicle_notices_sent = 0;  ///< To one vehicle each.
   std::uint64_t vehicles_joined = 0;       ///< Told all around them.
   std::uint64_t vehicles_behind = 0;       ///< Told what they missed.

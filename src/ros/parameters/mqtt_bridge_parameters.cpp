@@ -105,8 +105,8 @@ BridgeTopic ReadBridgeTopic(const XmlRpc::XmlRpcValue& entry, const std::string&
 /// What must hold so that no message can be attributed to the wrong vehicle.
 void CheckBridgeTopic(const BridgeTopic& topic, const BridgeConfig& config) {
   const transport::TopicTemplate mqtt_topic(topic.mqtt_topic);
-  const bool has_vehicle_id =
-      MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes))->has_vehicle_id();
+  const auto type = MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes));
+  const bool has_vehicle_id = type->has_vehicle_id();
   const std::string what = "topic '" + topic.name + "' of the bridge ";
   if (config.role == BridgeRole::kZone) {
     if (topic.direction == BridgeDirection::kIn && !mqtt_topic.has_vehicle()) {
@@ -118,8 +118,18 @@ void CheckBridgeTopic(const BridgeTopic& topic, const BridgeConfig& config) {
                   "' without a field vehicle_id, so its MQTT topic cannot have {vehicle}");
     }
   }
+  const bool is_zone = config.role == BridgeRole::kZone;
+  if (mqtt_topic.has_cell() && is_zone == (topic.direction == BridgeDirection::kIn)) {
+    throw Error(what + "has MQTT topic '" + topic.mqtt_topic +
+                "', but the level {cell} is accepted in what a zone sends out and a vehicle takes "
+                "in alone");
+  }
+  if (mqtt_topic.has_cell() && !type->has_place()) {
+    throw Error(what + "has type '" + topic.type +
+                "' without fields latitude and longitude, so its MQTT topic cannot have {cell}");
+  }
   // Expands, and so checks, the names that are known now.
-  mqtt_topic.Expand({config.zone, config.role == BridgeRole::kZone ? "any" : config.user});
+  mqtt_topic.Expand({config.zone, is_zone ? "any" : config.user, "any"});
 }
 
 std::vector<BridgeTopic> ReadBridgeTopics(ParameterReader& parameters) {
@@ -128,7 +138,8 @@ std::vector<BridgeTopic> ReadBridgeTopics(ParameterReader& parameters) {
       "Topics that the bridge carries; docs/how-to/bridge-other-topics.md lists the keys of an "
       "entry. On the zone's side incoming messages get their vehicle_id from the level {vehicle} "
       "of the MQTT topic, which the broker lets only that vehicle write, and outgoing messages on "
-      "a topic with {vehicle} go to the vehicle_id in the message.");
+      "a topic with {vehicle} go to the vehicle_id in the message, those on a topic with {cell} to "
+      "the cell of its latitude and longitude. A vehicle hears of the cells on vehicle/cells.");
   if (list.getType() != XmlRpc::XmlRpcValue::TypeArray || list.size() == 0) {
     throw Error("parameter 'topics' of the bridge is no list, accepted is a list of topics");
   }

@@ -22,7 +22,7 @@ struct BridgeTopic {
   std::string name;        ///< For diagnostics: "reports" is counted as reports_out.
   std::string ros_topic;   ///< Relative names are resolved in the nodelet's namespace.
   std::string type;        ///< E.g. "livemap/HazardReport"; see BridgedTypeNames.
-  std::string mqtt_topic;  ///< Template with {zone} and {vehicle}.
+  std::string mqtt_topic;  ///< Template with {zone}, {vehicle} and {cell}.
   BridgeDirection direction = BridgeDirection::kOut;
   int qos = 1;            ///< 0 or 1.
   int max_bytes = 65536;  ///< One MQTT payload; more is refused in both directions.

@@ -158,10 +158,13 @@ void ReadZoneCommits(ParameterReader& parameters, ZoneCloudletConfig& config) {
 
 void ReadZoneCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
   zone::CatchUpPlanner::Config& catch_up = config.catch_up;
+  catch_up.cell_wait_s = 5;
   parameters.Section(
       "What one vehicle is told",
       "The zone tells a vehicle everything around it when it is new here, was silent for "
-      "join_gap_s or has driven half of join_radius_m; and what it missed when it says so.");
+      "join_gap_s or has driven half of join_radius_m; and what it missed when it says so. A "
+      "vehicle that asks about cells of the map is told those instead "
+      "(docs/explanation/delivery.md).");
   parameters.Read("join_radius_m", catch_up.radius_m, {1, 100000},
                   "Hazards within this distance of the vehicle are told.", "m");
   parameters.Read("join_max_hazards", config.join_max_hazards, {1, 100000},
@@ -179,6 +182,13 @@ void ReadZoneCatchUp(ParameterReader& parameters, ZoneCloudletConfig& config) {
       "Time before a vehicle that still lacks something is told again. It doubles each time.", "s");
   parameters.Read("catch_up_longest_retry_s", catch_up.longest_retry_s, {0.1, 3600},
                   "Longest time before a vehicle is told again.", "s");
+  parameters.Read("notices_to_all", config.notices_to_all,
+                  "Tell announcements to every vehicle on hazard/notice, too, as vehicles that do "
+                  "not ask about cells need it. false: only to the vehicles near the hazard.");
+  parameters.Read("cell_wait_s", catch_up.cell_wait_s, {0, 60},
+                  "Time in which a new vehicle may ask about cells before it is told everything "
+                  "around it.",
+                  "s");
   parameters.Read("notice_picture_bytes", config.notice_picture_bytes, {0, 60000},
                   "Size of the small picture in a notice of a new hazard. 0: none.", "bytes");
   parameters.Read("advance_period_s", config.advance_period_s, {0.05, 60},

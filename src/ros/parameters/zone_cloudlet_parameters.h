@@ -25,6 +25,7 @@ struct ZoneCloudletConfig {
   zone::CatchUpPlanner::Config catch_up;   ///< join_* and catch_up_* of the file.
   int join_max_hazards = 2000;             ///< What a vehicle is told at once: the nearest ones.
   int join_picture_bytes = 100000;         ///< Of all pictures of what a vehicle is told at once.
+  bool notices_to_all = true;              ///< Tell announcements to every vehicle, too.
   int notice_picture_bytes = 4096;         ///< Of the picture in a notice of a new hazard; 0: none.
   double advance_period_s = 1.0;           ///< Between two looks at what time has changed.
   std::string map_frame = "map";           ///< Of hazard/markers: x east, y north.

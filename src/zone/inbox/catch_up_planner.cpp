@@ -19,9 +19,12 @@ CatchUpPlanner::Vehicle& CatchUpPlanner::Heard(const std::string& vehicle_id, st
   Vehicle& vehicle = vehicles_[vehicle_id];
   if (vehicle.heard_ns != 0 && now_ns - vehicle.heard_ns > SecondsToNs(config_.gap_s)) {
     const bool in_progress = vehicle.in_progress;
+    const auto asked_cells_ns = vehicle.asked_cells_ns;
     vehicle = Vehicle{};
+    vehicle.asked_cells_ns = asked_cells_ns;
     vehicle.in_progress = in_progress;
   }
+  if (vehicle.heard_ns == 0) vehicle.new_ns = now_ns;
   vehicle.heard_ns = now_ns;
   return vehicle;
 }
@@ -31,6 +34,9 @@ std::optional<CatchUpOrder> CatchUpPlanner::Update(const std::string& vehicle_id
                                                    std::uint64_t map_sequence,
                                                    std::uint64_t announced, std::int64_t now_ns) {
   Vehicle& vehicle = Heard(vehicle_id, now_ns);
+  const bool asks_cells =
+      vehicle.asked_cells_ns && now_ns - *vehicle.asked_cells_ns <= SecondsToNs(config_.cell_gap_s);
+  if (asks_cells || now_ns - vehicle.new_ns < SecondsToNs(config_.cell_wait_s)) return std::nullopt;
   // What was never announced is no knowledge: it shows no progress.
   if (map_sequence >= vehicle.target && map_sequence <= announced) {
     vehicle.target = announced;
@@ -51,6 +57,17 @@ std::optional<CatchUpOrder> CatchUpPlanner::Update(const std::string& vehicle_id
   vehicle.in_progress = true;
   vehicle.target = std::max(vehicle.target, announced);
   return CatchUpOrder{vehicle_id, *vehicle.centre, all ? 0 : map_sequence, map_sequence};
+}
+
+bool CatchUpPlanner::TakeInvitation(const std::string& vehicle_id) {
+  const auto found = vehicles_.find(vehicle_id);
+  if (found == vehicles_.end() || found->second.is_invited) return false;
+  found->second.is_invited = true;
+  return !found->second.asked_cells_ns;
+}
+
+void CatchUpPlanner::NoteCellRequest(const std::string& vehicle_id, std::int64_t now_ns) {
+  Heard(vehicle_id, now_ns).asked_cells_ns = now_ns;
 }
 
 void CatchUpPlanner::Told(const std::string& vehicle_id, std::int64_t now_ns) {

@@ -27,7 +27,7 @@ struct CatchUpOrder {
 /// of before, or has driven half the radius away from where it was last told. What it missed: to
 /// one that after `lag_s` still does not know what was announced then. What it missed is told
 /// around where it was last told all, so that within half the radius around a vehicle its map is
-/// right.
+/// right. Nothing: to a vehicle that asks about cells of the map itself.
 class CatchUpPlanner {
  public:
   struct Config {
@@ -35,7 +35,9 @@ class CatchUpPlanner {
     double lag_s = 3;    ///< Announcements are on their way for this long.
     double retry_s = 5;  ///< After a telling; doubled each time until the vehicle knows more.
     double longest_retry_s = 60;
-    double gap_s = 60;                 ///< A vehicle silent for this long is new.
+    double gap_s = 60;        ///< A vehicle silent for this long is new.
+    double cell_wait_s = 0;   ///< A new vehicle has so long to ask about cells.
+    double cell_gap_s = 300;  ///< One that has not asked about cells for this long no longer does.
     std::size_t max_vehicles = 10000;  ///< Beyond it the longest silent one is forgotten.
   };
 
@@ -46,6 +48,11 @@ class CatchUpPlanner {
   std::optional<CatchUpOrder> Update(const std::string& vehicle_id, const geo::GeoPoint& position,
                                      std::uint64_t map_sequence, std::uint64_t announced,
                                      std::int64_t now_ns);
+  /// Whether the vehicle is to be invited to ask about cells of the map, if it can: it is new, and
+  /// has not asked. True once.
+  bool TakeInvitation(const std::string& vehicle_id);
+  /// The vehicle has asked about cells of the map.
+  void NoteCellRequest(const std::string& vehicle_id, std::int64_t now_ns);
   /// The order of this vehicle is done.
   void Told(const std::string& vehicle_id, std::int64_t now_ns);
 
@@ -54,6 +61,9 @@ class CatchUpPlanner {
  private:
   struct Vehicle {
     std::int64_t heard_ns = 0;
+    std::int64_t new_ns = 0;  // When it was new.
+    std::optional<std::int64_t> asked_cells_ns;
+    bool is_invited = false;
     std::optional<geo::GeoPoint> centre;  // Where it was last told all.
     std::uint64_t target = 0;             // What it should know by target_ns + lag.
     std::uint64_t known = 0;              // The most that it said it knows, of what was announced.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/mutex.h"
+#include "protocol/cell_news.h"
 #include "protocol/map_change_report.h"
 #include "protocol/poll.h"
 #include "protocol/report.h"
@@ -35,6 +36,7 @@ class ZoneInbox {
     std::size_t max_bytes = 256'000'000;  ///< Of the reports' pictures together.
     std::size_t max_map_changes = 10000;
     std::size_t max_answers = 10000;
+    std::size_t max_cell_requests = 20000;
     std::size_t batch = 500;  ///< Reports, and map changes, that are taken at once.
   };
   struct Batch {
@@ -42,9 +44,11 @@ class ZoneInbox {
     std::vector<protocol::MapChangeReport> map_changes;
     std::deque<protocol::PollAnswer> answers;
     std::deque<CatchUpOrder> orders;
+    std::deque<protocol::CellRequest> cell_requests;
 
     bool empty() const {
-      return reports.empty() && map_changes.empty() && answers.empty() && orders.empty();
+      return reports.empty() && map_changes.empty() && answers.empty() && orders.empty() &&
+             cell_requests.empty();
     }
   };
 
@@ -61,8 +65,11 @@ class ZoneInbox {
   /// none.
   void Push(CatchUpOrder order);
 
-  /// Waits up to `patience` for anything, then takes what is there, oldest first: all answers and
-  /// orders, and reports and map changes up to Config::batch each.
+  /// False when there is no room for the request, or the inbox is closed: the vehicle asks again.
+  bool Push(protocol::CellRequest request);
+
+  /// Waits up to `patience` for anything, then takes what is there, oldest first: all answers,
+  /// orders and requests for cells, and reports and map changes up to Config::batch each.
   Batch Take(std::chrono::milliseconds patience);
 
   /// Wakes the worker; nothing is accepted any more, what is there can still be taken.
@@ -74,7 +81,7 @@ class ZoneInbox {
  private:
   bool HasNews() const REQUIRES(mutex_) {
     return closed_ || !reports_.empty() || !map_changes_.empty() || !answers_.empty() ||
-           !orders_.empty();
+           !orders_.empty() || !cell_requests_.empty();
   }
 
   const Config config_;
@@ -84,6 +91,7 @@ class ZoneInbox {
   std::deque<protocol::MapChangeReport> map_changes_ GUARDED_BY(mutex_);
   std::deque<protocol::PollAnswer> answers_ GUARDED_BY(mutex_);
   std::deque<CatchUpOrder> orders_ GUARDED_BY(mutex_);
+  std::deque<protocol::CellRequest> cell_requests_ GUARDED_BY(mutex_);
   std::size_t bytes_ GUARDED_BY(mutex_) = 0;  ///< Of the reports' pictures.
   bool closed_ GUARDED_BY(mutex_) = false;
 };
@@ -135,6 +143,16 @@ inline void ZoneInbox::Push(CatchUpOrder order) {
   arrived_.NotifyOne();
 }
 
+inline bool ZoneInbox::Push(protocol::CellRequest request) {
+  {
+    const MutexLock lock(mutex_);
+    if (closed_ || cell_requests_.size() >= config_.max_cell_requests) return false;
+    cell_requests_.push_back(std::move(request));
+  }
+  arrived_.NotifyOne();
+  return true;
+}
+
 inline ZoneInbox::Batch ZoneInbox::Take(std::chrono::milliseconds patience) {
   const MutexLock lock(mutex_);
   const auto deadline = std::chrono::steady_clock::now() + patience;
@@ -143,6 +161,7 @@ inline ZoneInbox::Batch ZoneInbox::Take(std::chrono::milliseconds patience) {
   Batch batch;
   batch.answers.swap(answers_);
   batch.orders.swap(orders_);
+  batch.cell_requests.swap(cell_requests_);
   while (!map_changes_.empty() && batch.map_changes.size() < config_.batch) {
     batch.map_changes.push_back(std::move(map_changes_.front()));
     map_changes_.pop_front();

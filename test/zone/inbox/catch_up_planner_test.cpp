@@ -157,5 +157,33 @@ TEST_F(CatchUpTest, ManyVehiclesAreBounded) {
   planner.Told("car-0", 2000);
 }
 
+TEST_F(CatchUpTest, AVehicleThatAsksAboutCellsIsToldNothingElse) {
+  planner_.NoteCellRequest("car-1", now_ns_);
+  for (int i = 0; i < 200; ++i) EXPECT_FALSE(Say(0, 100.0 * i));
+}
+
+TEST_F(CatchUpTest, AVehicleThatNoLongerAsksAboutCellsIsToldAllAroundIt) {
+  planner_.NoteCellRequest("car-1", now_ns_);
+  EXPECT_EQ(SecondsUntilTold(0, 1000), 301);
+}
+
+TEST_F(CatchUpTest, AVehicleThatIsNewIsInvitedOnceToAskAboutCells) {
+  EXPECT_FALSE(planner_.TakeInvitation("car-1"));
+  Say(0);
+  EXPECT_TRUE(planner_.TakeInvitation("car-1"));
+  Say(0);
+  EXPECT_FALSE(planner_.TakeInvitation("car-1"));
+  planner_.NoteCellRequest("car-2", now_ns_);
+  Say(0, 0, "car-2");
+  EXPECT_FALSE(planner_.TakeInvitation("car-2"));
+}
+
+TEST_F(CatchUpTest, ANewVehicleHasAMomentToAskAboutCells) {
+  CatchUpPlanner::Config config;
+  config.cell_wait_s = 3;
+  planner_ = CatchUpPlanner(config);
+  EXPECT_EQ(SecondsUntilTold(0, 100), 4);
+}
+
 }  // namespace
 }  // namespace livemap::zone

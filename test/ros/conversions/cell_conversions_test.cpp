@@ -1,0 +1,107 @@
+#include "ros/conversions/cell_conversions.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "common/error.h"
+
+namespace livemap::ros_io {
+namespace {
+
+const geo::MapCell kHere = geo::MapCell::At({48.1, 11.5});
+const geo::MapCell kThere = geo::MapCell::At({48.3, 11.5});
+
+protocol::CellNews::Hazard PotholeOfCell(std::uint8_t number) {
+  protocol::CellNews::Hazard hazard;
+  hazard.hazard_uuid.bytes[0] = number;
+  hazard.sequence = 100 + number;
+  hazard.class_name = "pothole";
+  hazard.confidence = 0.5F;
+  hazard.position = {48.1, 11.5};
+  hazard.stamp_ns = 1'700'000'000'123'456'789;
+  return hazard;
+}
+
+TEST(CellConversionsTest, ARequestCrossesUnchanged) {
+  protocol::CellRequest request;
+  request.vehicle_id = "car-1";
+  request.cells = {{kHere, 0}, {kThere, UINT64_MAX}};
+  request.zone = "west";
+  const protocol::CellRequest back = FromMessage(ToMessage(request));
+  EXPECT_EQ(back.vehicle_id, "car-1");
+  EXPECT_EQ(back.zone, "west");
+  ASSERT_EQ(back.cells.size(), 2U);
+  EXPECT_EQ(back.cells[0].cell, kHere);
+  EXPECT_EQ(back.cells[1].cell, kThere);
+  EXPECT_EQ(back.cells[1].sequence, UINT64_MAX);
+}
+
+TEST(CellConversionsTest, ImpossibleRequestsAreRefused) {
+  const CellRequest valid = ToMessage(protocol::CellRequest{"car-1", {{kHere, 7}}, ""});
+  CellRequest message = valid;
+  message.cells[0] = 1U << 30;
+  EXPECT_THROW(FromMessage(message), Error);
+  message = valid;
+  message.sequences.clear();
+  EXPECT_THROW(FromMessage(message), Error);
+  message = valid;
+  message.cells.resize(65);
+  message.sequences.resize(65);
+  EXPECT_THROW(FromMessage(message), Error);
+  message = valid;
+  message.schema_version = 2;
+  EXPECT_THROW(FromMessage(message), Error);
+}
+
+TEST(CellConversionsTest, HazardsStayWithTheirCells) {
+  protocol::CellNews news;
+  news.vehicle_id = "car-1";
+  protocol::CellNews::Hazard gone;
+  gone.hazard_uuid.bytes[0] = 9;
+  gone.sequence = 12;
+  gone.removed = true;
+  news.cells.push_back({kHere, 7, 20, {PotholeOfCell(1), gone}});
+  news.cells.push_back({kThere, 20, 20, {}});
+  news.cells.push_back({kThere, 0, 20, {PotholeOfCell(2)}});
+  const protocol::CellNews back = FromMessage(ToMessage(news));
+  ASSERT_EQ(back.cells.size(), 3U);
+  EXPECT_EQ(back.cells[0].since, 7U);
+  EXPECT_EQ(back.cells[0].sequence, 20U);
+  ASSERT_EQ(back.cells[0].hazards.size(), 2U);
+  EXPECT_EQ(back.cells[0].hazards[0].class_name, "pothole");
+  EXPECT_EQ(back.cells[0].hazards[0].stamp_ns, PotholeOfCell(1).stamp_ns);
+  EXPECT_TRUE(back.cells[0].hazards[1].removed);
+  EXPECT_TRUE(back.cells[1].hazards.empty());
+  ASSERT_EQ(back.cells[2].hazards.size(), 1U);
+  EXPECT_EQ(back.cells[2].hazards[0].sequence, 102U);
+}
+
+TEST(CellConversionsTest, HazardsThatBelongToNoCellOrAreMissingAreRefused) {
+  protocol::CellNews news;
+  news.cells.push_back({kHere, 0, 20, {PotholeOfCell(1)}});
+  CellHazards message = ToMessage(news);
+  message.cells[0].hazards = 2;
+  EXPECT_THROW(FromMessage(message), Error);
+  message.cells[0].hazards = UINT32_MAX;
+  EXPECT_THROW(FromMessage(message), Error);
+  message.cells[0].hazards = 0;
+  EXPECT_THROW(FromMessage(message), Error);
+  message.cells[0].hazards = 1;
+  EXPECT_NO_THROW(FromMessage(message));
+  message.cells[0].cell = UINT32_MAX;
+  EXPECT_THROW(FromMessage(message), Error);
+}
+
+TEST(CellConversionsTest, AListOfCellsCrossesUnchangedAndIsBounded) {
+  const VehicleCells message = ToMessage({kHere, kThere}, "west");
+  EXPECT_EQ(message.zone, "west");
+  EXPECT_EQ(FromMessage(message), (std::vector<geo::MapCell>{kHere, kThere}));
+  VehicleCells many;
+  many.cells.resize(65);
+  EXPECT_THROW(FromMessage(many), Error);
+}
+
+}  // namespace
+}  // namespace livemap::ros_io
