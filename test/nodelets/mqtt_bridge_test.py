@@ -11,11 +11,13 @@ import unittest
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "support"))
 
 import genmsg  # noqa: E402
+import yaml  # noqa: E402
 import genmsg.msg_loader  # noqa: E402
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from livemap.msg import (  # noqa: E402
-    HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange, ReportReceipt, VehiclePosition)
+    CellHazard, CellHazards, CellRequest, CellState, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange,
+    ReportReceipt, VehicleCells, VehiclePosition)
 from node_testing import SOURCE_DIRECTORY  # noqa: E402
 from mqtt_bridge_fixture import (  # noqa: E402
     Bridge, Broker, Master, Peer, WIRE_MD5, envelope, eventually, serialise, wire_payload)
@@ -26,6 +28,9 @@ ZONE_TOPICS = {
     "pub:/hazard/receipt": ReportReceipt,
     "pub:/hazard/notice": HazardNotice,
     "pub:/hazard/vehicle_notice": HazardNotice,
+    "pub:/hazard/cell_notice": HazardNotice,
+    "sub:/hazard/cell_request": CellRequest,
+    "pub:/hazard/cell_hazards": CellHazards,
     "pub:/hazard/poll": HazardPoll,
     "sub:/hazard/poll_answer": HazardPollAnswer,
     "sub:/change/map_change": MapChange,
@@ -39,6 +44,12 @@ VEHICLE_TOPICS = {
     "pub:/vehicle/position": VehiclePosition,
     "sub:/hazard/receipt": ReportReceipt,
     "sub:/hazard/notice": HazardNotice,
+    "sub:/hazard/cell_notice": HazardNotice,
+    "pub:/vehicle/cells": VehicleCells,
+    "sub:/vehicle/cells_heard": VehicleCells,
+    "pub:/hazard/cell_request": CellRequest,
+    "sub:/hazard/cell_hazards": CellHazards,
+    "sub:/old/hazard/notice": HazardNotice,
     "sub:/hazard/poll": HazardPoll,
     "pub:/hazard/poll_answer": HazardPollAnswer,
     "pub:/change/map_change": MapChange,
@@ -58,6 +69,8 @@ def report(drive_id):
 
 
 STANDARD_MESSAGES = "/usr/share/{}/msg"
+# Cells at 11.5 degrees east: the Web Mercator tiles 15/17430/11377 and 15/17430/11349, their quadkeys read to the base 4.
+CELL_OF_48_1, CELL_OF_48_3 = 414198550, 414196534
 # Of HazardReport.msg before it had the fields that are now its last 16 bytes.
 MD5_OF_VERSION_1 = "6c9f383b83ba26551f53b42caa304fa7"
 # Of VehiclePosition.msg before it had its last 4 bytes.
@@ -133,15 +146,76 @@ class MqttBridgeTest(unittest.TestCase):
                                        if m.drive_id == "p"], "the position arrives")[0]
         self.assertEqual((received.vehicle_id, received.latitude), ("car-1", 1.5))
 
-    def test_receipt_reaches_its_addressee_alone_and_notices_reach_all(self):
+    def hear_of(self, *cells):
+        """The vehicle wants to hear of these cells of the map alone, and does."""
+        self.vehicle_peer.publish("/vehicle/cells", VehicleCells(cells=cells))
+        eventually(lambda: (heard := self.vehicle_peer.received("/vehicle/cells_heard"))
+                   and heard[-1].zone == "test" and sorted(heard[-1].cells) == sorted(cells), "the broker grants it")
+
+    def test_a_receipt_reaches_its_addressee_alone(self):
         for vehicle in ("car-2", "car-1"):
             self.zone_peer.publish("/hazard/receipt",
                                    ReportReceipt(vehicle_id=vehicle, reason="for " + vehicle))
-        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=7, class_name="pothole"))
-        eventually(lambda: self.vehicle_peer.received("/hazard/notice"), "the notice arrives")
         receipts = eventually(lambda: self.vehicle_peer.received("/hazard/receipt"),
                               "the receipt arrives")
         self.assertEqual([r.reason for r in receipts], ["for car-1"])
+
+    def test_a_notice_reaches_the_vehicles_that_hear_of_its_cell_alone(self):
+        def tell(sequence, latitude):
+            self.zone_peer.publish("/hazard/cell_notice", HazardNotice(sequence=sequence, class_name="pothole",
+                                                                       latitude=latitude, longitude=11.5))
+
+        def heard(sequence):
+            return [notice for notice in self.vehicle_peer.received("/hazard/cell_notice") if notice.sequence == sequence]
+        self.hear_of(CELL_OF_48_1)
+        tell(201, 48.3)
+        tell(202, 48.1)
+        self.assertEqual(eventually(lambda: heard(202), "the notice arrives")[0].zone, "test")
+        self.assertEqual(heard(201), [])
+        self.hear_of(CELL_OF_48_3)
+        tell(203, 48.1)
+        tell(204, 48.3)
+        eventually(lambda: heard(204), "the notice of the other cell arrives")
+        self.assertEqual(heard(203), [])
+
+    def test_a_notice_of_no_place_and_a_list_of_impossible_cells_are_refused(self):
+        before = self.zone_count("cell_notices_refused")
+        self.zone_peer.publish("/hazard/cell_notice", HazardNotice(sequence=205, latitude=float("nan")))
+        eventually(lambda: self.zone_count("cell_notices_refused") == before + 1, "it is counted")
+        self.vehicle_peer.publish("/vehicle/cells", VehicleCells(cells=[1 << 30]))
+        self.vehicle_peer.publish("/vehicle/cells", VehicleCells(cells=range(65)))
+        self.hear_of(CELL_OF_48_1)
+
+    def test_a_question_about_cells_and_its_answer_reach_zone_and_vehicle(self):
+        self.vehicle_peer.publish("/hazard/cell_request", CellRequest(
+            vehicle_id="mayor", cells=[CELL_OF_48_1, CELL_OF_48_3], sequences=[0, 1 << 40]))
+        asked = eventually(lambda: self.zone_peer.received("/hazard/cell_request"), "the question arrives")[0]
+        self.assertEqual((asked.vehicle_id, list(asked.cells), list(asked.sequences)),
+                         ("car-1", [CELL_OF_48_1, CELL_OF_48_3], [0, 1 << 40]))
+        for vehicle in ("car-2", "car-1"):
+            self.zone_peer.publish("/hazard/cell_hazards", CellHazards(
+                vehicle_id=vehicle, cells=[CellState(cell=CELL_OF_48_1, sequence=7, hazards=1)],
+                hazards=[CellHazard(class_name="for " + vehicle)]))
+        told = eventually(lambda: self.vehicle_peer.received("/hazard/cell_hazards"), "the answer arrives")
+        self.assertEqual([(news.zone, news.hazards[0].class_name) for news in told], [("test", "for car-1")])
+
+    def test_a_vehicle_that_does_not_know_of_cells_hears_of_the_whole_zone(self):
+        path = os.path.join(SOURCE_DIRECTORY, "config", "mqtt_bridge_vehicle.yaml")
+        with open(path, encoding="utf-8") as file:
+            topics = [topic for topic in yaml.safe_load(file)["topics"] if "cell" not in topic["name"]]
+        topics.append({"name": "notices", "ros_topic": "hazard/notice", "type": "livemap/HazardNotice", "direction": "in",
+                       "mqtt_topic": "livemap/v1/{zone}/notice"})
+        for topic in topics:
+            topic["ros_topic"] = "/old/" + topic["ros_topic"]
+        old = self.another_bridge("old", topics=topics)
+        try:
+            def arrived():
+                self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=7, class_name="pothole"))
+                return self.vehicle_peer.received("/old/hazard/notice")
+            eventually(arrived, "the notice arrives")
+            self.assertEqual([notice for notice in self.vehicle_peer.received("/hazard/notice") if notice.sequence == 7], [])
+        finally:
+            old.stop()
 
     def test_polls_and_what_one_vehicle_is_told_reach_that_vehicle_alone(self):
         for vehicle in ("car-2", "car-1"):
@@ -152,7 +226,7 @@ class MqttBridgeTest(unittest.TestCase):
         self.assertEqual([p.class_name for p in polls], ["for car-1"])
         own = eventually(lambda: [n for n in self.vehicle_peer.received("/hazard/notice") if n.vehicle_id],
                          "the notice arrives where all notices do")
-        self.assertEqual([n.class_name for n in own], ["for car-1"])
+        self.assertEqual([n.class_name for n in own if n.sequence == 70], ["for car-1"])
 
     def test_zone_receives_a_poll_answer_under_the_identity_of_the_connection(self):
         sent = HazardPollAnswer(vehicle_id="mayor", drive_id="p", confidence=0.5)
@@ -245,7 +319,8 @@ class MqttBridgeTest(unittest.TestCase):
             self.assertEqual(file.read(), envelope(change), "as vehicles without the field send it")
         received = [c for c in self.zone_peer.received("/change/map_change") if c.class_name == "with a zone"]
         self.assertEqual({c.zone for c in received}, {""})
-        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=77, zone="elsewhere"))
+        self.zone_peer.publish("/hazard/vehicle_notice",
+                               HazardNotice(sequence=77, vehicle_id="car-1", zone="elsewhere"))
         notice = eventually(lambda: [n for n in self.vehicle_peer.received("/hazard/notice") if n.sequence == 77],
                             "the notice arrives")[0]
         self.assertEqual(notice.zone, "test")
@@ -312,15 +387,16 @@ class MqttBridgeTest(unittest.TestCase):
         self.vehicle_peer.publish("/hazard/report", report("into the void"))
         eventually(lambda: self.vehicle_count("car_bridge", "reports_dropped") == dropped + 1,
                    "the report is dropped and counted")
-        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=1000))
+        self.zone_peer.publish("/hazard/cell_notice", HazardNotice(sequence=1000, latitude=48.1, longitude=11.5))
         shutil.rmtree(os.path.join(self.broker.directory, "data"))
         self.broker.start()
         self.wait_connected()
         self.vehicle_peer.publish("/hazard/report", report("resumed"))
         eventually(lambda: self.reports_of("resumed"), "the next report arrives")
-        self.zone_peer.publish("/hazard/notice", HazardNotice(sequence=1001))
+        self.hear_of(CELL_OF_48_1)
+        self.zone_peer.publish("/hazard/cell_notice", HazardNotice(sequence=1001, latitude=48.1, longitude=11.5))
         eventually(lambda: 1001 in [n.sequence for n in
-                                    self.vehicle_peer.received("/hazard/notice")],
+                                    self.vehicle_peer.received("/hazard/cell_notice")],
                    "the next notice arrives")
 
     def test_bad_parameters_are_one_clear_sentence_and_a_failed_load(self):

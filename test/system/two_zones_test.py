@@ -30,7 +30,7 @@ import demo_observers as observers  # noqa: E402
 import demo_system as system  # noqa: E402
 from hazard_reporting_fixture import (FOCAL_PX, HEIGHT, OPTICAL, SPEED_MPS, WIDTH, detection, on_street,  # noqa: E402
                                       place)
-from livemap.msg import DetectionArray, HazardAlert, HazardNotice, HazardReport, VehicleZones  # noqa: E402
+from livemap.msg import CellHazards, DetectionArray, HazardAlert, HazardNotice, HazardReport, VehicleZones  # noqa: E402
 from mqtt_bridge_fixture import Master, Peer  # noqa: E402
 from node_testing import eventually  # noqa: E402
 
@@ -119,8 +119,9 @@ class TwoZonesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("two_zones_test")
-        cls.notices, cls.zones, cls.values, cls.alerts = [], [], {}, []
-        cls.ends = [rospy.Subscriber("/hazard/notice", HazardNotice, cls.notices.append),
+        cls.told, cls.zones, cls.values, cls.alerts = set(), [], {}, []
+        cls.ends = [rospy.Subscriber("/hazard/cell_notice", HazardNotice, cls.keep_notice),
+                    rospy.Subscriber("/hazard/cell_hazards", CellHazards, cls.keep_cells),
                     rospy.Subscriber("/zones", VehicleZones, cls.zones.append),
                     rospy.Subscriber("/hazard/alert", HazardAlert, cls.keep_alert),
                     rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics)]
@@ -141,6 +142,21 @@ class TwoZonesTest(unittest.TestCase):
         cls.tell_east_of_the_hazard()
         cls.at_m, cls.direction = 0.0, 1
         cls.start_vehicle(folder / VEHICLE)
+
+    @classmethod
+    def keep_notice(cls, message):
+        if message.action != HazardNotice.REMOVED:
+            cls.told.add((message.zone, bytes(message.hazard_uuid)))
+
+    @classmethod
+    def keep_cells(cls, message):
+        for hazard in message.hazards:
+            if not hazard.removed:
+                cls.told.add((message.zone, bytes(hazard.hazard_uuid)))
+
+    @classmethod
+    def told_by_east(cls):
+        return {hazard for zone, hazard in set(cls.told) if zone == "east"}
 
     @classmethod
     def keep_alert(cls, message):
@@ -239,8 +255,7 @@ class TwoZonesTest(unittest.TestCase):
         self.west.kill()
         self.drive(230.0, things_m)
         # Before the border: east talks to the vehicle, though the vehicle still is in west, which is dead.
-        self.stand_until(lambda: [n for n in self.notices if n.zone == "east" and n.action == HazardNotice.ADDED],
-                         "the hazard behind the border is known")
+        self.stand_until(self.told_by_east, "the hazard behind the border is known")
         self.assertEqual(self.zones[-1].zones, ["west", "east"])
         self.assertEqual(self.bridge("present_zone"), "west")
         self.assertIn(self.pending(), ("1", "2"), "what was seen since waits for west")
@@ -267,7 +282,7 @@ class TwoZonesTest(unittest.TestCase):
         self.assert_hazards(self.east, (BEHIND_THE_BORDER_M, OF_OTHERS_M, *DEEP_IN_EAST_M))
 
     def assert_warned_before_the_border(self):
-        announced = {bytes(n.hazard_uuid) for n in self.notices if n.zone == "east" and n.action == HazardNotice.ADDED}
+        announced = self.told_by_east()
         warned_at_m = [at_m for alert, at_m in self.alerts
                        if alert.state == HazardAlert.APPROACH and bytes(alert.hazard_uuid) in announced]
         self.assertTrue(warned_at_m, self.alerts)

@@ -39,6 +39,13 @@ class BenchFleetTest(unittest.TestCase):
         self.assertIn("| 20 of 20 |", page)
         self.assertEqual(set(fleet["cores"]), {"broker", "bridge", "zone", "fleet", "machine"})
 
+    def test_vehicles_that_do_not_know_of_cells_are_told_too(self):
+        with tempfile.TemporaryDirectory() as out:
+            done = bench("--quick", "--to-all", "--json", "--out", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        fleet, = json.loads(done.stdout)["fleets"]
+        self.assertEqual((fleet["connected"], fleet["cells_told"]), (20, 0))
+
     def test_a_wrong_number_of_vehicles_is_one_sentence(self):
         done = bench("--vehicles", "0")
         self.assertEqual((done.returncode, done.stdout), (2, ""))

@@ -60,6 +60,7 @@ class DriverAlertPart : public NodeletPart {
     // Notices that come from now on wait until the map has been read.
     subscribers_ = {
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
+        node.subscribe("hazard/cell_notice", 10000, &Self::OnNotice, this),
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("gps/velocity", 100, &Self::OnVelocity, this),
     };

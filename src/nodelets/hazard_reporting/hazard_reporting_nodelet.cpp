@@ -2,6 +2,9 @@
 #include <image_transport/image_transport.h>
 #include <image_transport/subscriber.h>
 #include <livemap/BestViews.h>
+#include <livemap/CellHazards.h>
+#include <livemap/CellRequest.h>
+#include <livemap/VehicleCells.h>
 #include <livemap/VehicleZones.h>
 #include <nav_msgs/Odometry.h>
 #include <ros/package.h>
@@ -29,6 +32,7 @@
 #include "nodelets/stamp_checks.h"
 #include "nodelets/vehicle_tf.h"
 #include "ros/conversions/camera_info_conversions.h"
+#include "ros/conversions/cell_conversions.h"
 #include "ros/conversions/depth_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
@@ -121,6 +125,8 @@ class HazardReportingPart : public NodeletPart {
     ros::NodeHandle& node = getNodeHandle();
     report_publisher_ = node.advertise<HazardReport>("hazard/report", 100);
     answer_publisher_ = node.advertise<HazardPollAnswer>("hazard/poll_answer", 100);
+    cell_request_publisher_ = node.advertise<CellRequest>("hazard/cell_request", 100);
+    cells_publisher_ = node.advertise<VehicleCells>("vehicle/cells", 1, /*latch=*/true);
     view_ = std::make_unique<VehicleView>(config_, *reporter_, catalogue_, node);
     const double max_ahead_s = config_.reporter.track.stamps.max_ahead_s;
     stamps_ = std::make_unique<StampChecks>(getName(), max_ahead_s, [this] { StartAnew(); });
@@ -138,6 +144,9 @@ class HazardReportingPart : public NodeletPart {
         node.subscribe("fix", 100, &Self::OnFix, this),
         node.subscribe("camera_rect/camera_info", 1, &Self::OnCameraInfo, this),
         node.subscribe("hazard/notice", 10000, &Self::OnNotice, this),
+        node.subscribe("hazard/cell_notice", 10000, &Self::OnCellNotice, this),
+        node.subscribe("hazard/cell_hazards", 1000, &Self::OnCellHazards, this),
+        node.subscribe("vehicle/cells_heard", 100, &Self::OnCellsHeard, this),
         node.subscribe("hazard/receipt", 1000, &Self::OnReceipt, this),
         node.subscribe("hazard/poll", 100, &Self::OnPoll, this),
         node.subscribe("change/report", 100, &Self::OnChanges, this),
@@ -302,7 +311,10 @@ class HazardReportingPart : public NodeletPart {
     Work();
   }
 
-  void OnZones(const VehicleZones& message) { view_->SetZones(message.zones); }
+  void OnZones(const VehicleZones& message) {
+    view_->SetZones(message.zones);
+    reporter_->SetZonesNear(message.zones);
+  }
 
   void OnFix(const sensor_msgs::NavSatFix& message) {
     if (!stamps_->IsUsable("a fix", message.header.stamp)) return;
@@ -315,6 +327,7 @@ class HazardReportingPart : public NodeletPart {
       // The first fix is believed once the next agrees: then both are shown.
       if (!before_ns) view_->ShowFix(*track.oldest_ns(), *track.Oldest());
       view_->ShowFix(*newest_ns, *track.Newest());
+      FollowCells(track.Newest()->position);
     }
     Work();
   }
@@ -335,7 +348,10 @@ class HazardReportingPart : public NodeletPart {
     const std::int64_t stamp_ns = ros_io::FromRosTime(message.header.stamp);
     const geo::TrackPose pose = ros_io::ToTrackPose(message, *view_->map());
     reporter_->AddPose(stamp_ns, pose, RosNowNs());
-    if (reporter_->poses().newest_ns() == stamp_ns) view_->ShowPose(pose, message.header.stamp);
+    if (reporter_->poses().newest_ns() == stamp_ns) {
+      view_->ShowPose(pose, message.header.stamp);
+      FollowCells(pose.position);
+    }
     Work();
   }
 
@@ -366,6 +382,40 @@ class HazardReportingPart : public NodeletPart {
     } catch (const Error& error) {
       NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
     }
+  }
+
+  /// To the vehicles of the cell in which its place lies.
+  void OnCellNotice(const HazardNotice& message) {
+    try {
+      protocol::Notice notice = ros_io::FromMessage(message);
+      if (!geo::IsValid(notice.position)) throw Error("a notice of a cell has no valid place");
+      notice.cell = geo::MapCell::At(notice.position);
+      reporter_->AddNotice(notice);
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
+  void OnCellHazards(const CellHazards& message) {
+    try {
+      reporter_->AddCellNews(ros_io::FromMessage(message));
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
+  void OnCellsHeard(const VehicleCells& message) {
+    try {
+      reporter_->SetCellsHeard(message.zone, ros_io::FromMessage(message));
+    } catch (const Error& error) {
+      NODELET_WARN_THROTTLE(kSayAgainS, "%s", error.what());
+    }
+  }
+
+  /// The vehicle is here: it hears of the cells around it.
+  void FollowCells(const geo::GeoPoint& position) {
+    if (!geo::IsValid(position) || !reporter_->FollowCells(position)) return;
+    cells_publisher_.publish(ros_io::ToMessage(reporter_->cells().wanted()));
   }
 
   void OnReceipt(const ReportReceipt& message) {
@@ -415,6 +465,9 @@ class HazardReportingPart : public NodeletPart {
     placed_by_fixes_ = by_fixes;
     AnswerPolls();
     OrderPictures(*reporter_);
+    for (const protocol::CellRequest& request : reporter_->TakeCellRequests(SteadyS())) {
+      cell_request_publisher_.publish(ros_io::ToMessage(request));
+    }
     // Without a listener a report would be spent, not sent.
     if (report_publisher_.getNumSubscribers() == 0) return;
     for (const protocol::Report& report : reporter_->TakeDue(SteadyS(), kSendPerTick)) {
@@ -480,7 +533,7 @@ class HazardReportingPart : public NodeletPart {
   std::unique_ptr<PictureMaker> maker_;
   std::unique_ptr<RecentImages<Kept>> images_;
   std::unique_ptr<vehicle::PictureWorker> worker_;
-  ros::Publisher report_publisher_, answer_publisher_;
+  ros::Publisher report_publisher_, answer_publisher_, cell_request_publisher_, cells_publisher_;
   image_transport::Subscriber image_subscriber_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::SteadyTimer> timers_;

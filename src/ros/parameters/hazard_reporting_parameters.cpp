@@ -259,6 +259,17 @@ void ReadReportingPolls(ParameterReader& parameters, HazardReportingConfig& conf
 }
 
 void ReadReportingViews(ParameterReader& parameters, HazardReportingConfig& config) {
+  parameters.Section("Cells of the map",
+                     "The vehicle hears of hazards in the cells of the map around it, and asks the "
+                     "zone what it lacks of them (docs/explanation/delivery.md).");
+  parameters.Read("cell_radius_m", config.reporter.cells.radius_m, {0, 10000},
+                  "The vehicle hears of the cells that come as near as this, at most the nearest "
+                  "48. 0: of none; then the zone tells it everything around it.",
+                  "m");
+  parameters.Read("cell_refresh_s", config.reporter.cells.refresh_s, {5, 120},
+                  "Time after which the vehicle asks again about each cell: the newest "
+                  "announcement may have been lost without a trace.",
+                  "s");
   parameters.Section("Published views");
   parameters.Read("position_period_s", config.position_period_s, {0.01, 3600},
                   "Time between two messages on vehicle/position.", "s");

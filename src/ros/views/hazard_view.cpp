@@ -142,6 +142,10 @@ void DescribeHazardReporter(const vehicle::HazardReporter& reporter, double stea
   status.add("waiting_frames", reporter.waiting_frames());
   status.add("notices", counters.notices);
   status.add("invalid_notices", counters.invalid_notices);
+  status.add("cells_heard", reporter.cells().heard());
+  status.add("cells_unanswered", reporter.cells().unanswered());
+  status.add("cell_requests", counters.cell_requests);
+  status.add("cell_answers", counters.cell_answers);
   status.add("notices_beyond_zone", reporter.map().beyond_zone());
   status.add("fixes", counters.fixes);
   status.add("invalid_fixes", counters.invalid_fixes);

@@ -26,8 +26,9 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
   if (!std::filesystem::exists(path, error)) return std::nullopt;
   SqliteDatabase database(path, false);
   SqliteStatement tables = database.Prepare(
-      "SELECT count(*) FROM sqlite_master WHERE type='table' AND name IN ('known','gone','zones')");
-  if (!tables.Step() || tables.Int(0) != 3) return std::nullopt;
+      "SELECT count(*) FROM sqlite_master WHERE type='table' AND name IN"
+      " ('known','gone','zones','cells')");
+  if (!tables.Step() || tables.Int(0) != 4) return std::nullopt;
   tables.Reset();
   StoredHazards stored;
   database.Transaction([&] {
@@ -48,7 +49,8 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
         "SELECT substr(zone,1,64),max(sequence) FROM"
         " (SELECT zone,sequence FROM known WHERE of_zone=1"
         " UNION ALL SELECT zone,sequence FROM gone"
-        " UNION ALL SELECT zone,map_sequence FROM zones) GROUP BY 1");
+        " UNION ALL SELECT zone,map_sequence FROM zones"
+        " UNION ALL SELECT zone,sequence FROM cells) GROUP BY 1");
     while (newest.Step()) {
       stored.sequences[newest.Text(0)] = static_cast<std::uint64_t>(newest.Int(1));
     }
@@ -57,7 +59,7 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
 }
 
 /// Whether the zone has said something newer about the hazard, or it is another zone's.
-bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word) const {
+bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word, bool is_there) const {
   const auto is_old = [&word](const Word& known) {
     // A map that knows one zone only names none.
     const bool is_same = word.zone == known.zone || word.zone.empty() || known.zone.empty();
@@ -66,7 +68,11 @@ bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word) const {
   const auto there = there_.find(id);
   if (there != there_.end()) return is_old(there->second);
   const auto gone = gone_.find(id);
-  return gone != gone_.end() && is_old(gone->second);
+  if (gone == gone_.end() || !is_old(gone->second)) return false;
+  // One announcement says that a hazard left a cell of the map and came into the next one.
+  const bool came_by_the_same = is_there && word.sequence == gone->second.sequence &&
+                                (word.zone == gone->second.zone || word.zone.empty());
+  return !came_by_the_same;
 }
 
 AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice) {
@@ -75,8 +81,9 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   // The end of a catch-up says what is gone by leaving it out: the map works that out.
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
   const Word word{notice.zone, notice.sequence};
-  if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, word)) return changes;
-  if (notice.action == Action::kRemoved) {
+  const bool is_there = notice.action != Action::kRemoved;
+  if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, word, is_there)) return changes;
+  if (!is_there) {
     if (gone_.size() >= kRemovedKept) gone_.clear();
     gone_[notice.hazard_uuid] = word;
     if (there_.erase(notice.hazard_uuid) > 0) duplicates_.Remove(notice.hazard_uuid, changes);
@@ -120,8 +127,9 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
     const Word word{row.zone, row.sequence};
-    if (!is_anew(row.zone) && IsOld(row.hazard.id, word)) continue;
+    if (!is_anew(row.zone) && IsOld(row.hazard.id, word, true)) continue;
     there_[row.hazard.id] = word;
+    gone_.erase(row.hazard.id);
     duplicates_.Put(row.hazard, row.zone, changes);
   }
   for (auto there = there_.begin(); there != there_.end();) {

@@ -71,7 +71,7 @@ class AnnouncedHazards {
     std::uint64_t sequence = 0;
   };
 
-  bool IsOld(const Uuid& id, const Word& word) const;
+  bool IsOld(const Uuid& id, const Word& word, bool is_there) const;
   std::set<std::string> ZonesBegunAnew(const StoredHazards& stored) const;
 
   std::unordered_map<Uuid, Word> there_;

@@ -31,6 +31,10 @@ constexpr char kBrokenZone[] =
     "NOT (typeof(map_sequence) = 'integer' AND "
     "map_sequence BETWEEN 0 AND 1152921504606846975)";
 
+constexpr char kBrokenCell[] =
+    "NOT (typeof(cell) = 'integer' AND cell BETWEEN 0 AND 1073741823 AND "
+    "typeof(sequence) = 'integer' AND sequence BETWEEN 0 AND 1152921504606846975)";
+
 std::string BrokenOr(const std::string& broken, const std::string& valid) {
   return broken + " OR NOT (" + valid + ")";
 }
@@ -105,7 +109,10 @@ InvalidRows RepairTables(SqliteDatabase& database) {
     broken.known =
         TakeOutInvalidRows(database, "known", BrokenOr(kBrokenKnown, kZoneColumnIsValid)) +
         TakeOutInvalidRows(database, "gone", BrokenOr(kBrokenGone, kZoneColumnIsValid)) +
-        TakeOutInvalidRows(database, "zones", BrokenOr(kBrokenZone, kZoneColumnIsValid));
+        TakeOutInvalidRows(database, "zones", BrokenOr(kBrokenZone, kZoneColumnIsValid)) +
+        TakeOutInvalidRows(database, "cells", BrokenOr(kBrokenCell, kZoneColumnIsValid));
+    // Nor does the vehicle know a cell of which something is taken out.
+    if (broken.known > 0) database.Execute("DELETE FROM cells");
   });
   broken.reports =
       CountInvalidRows(database, "pending", std::string("NOT (") + kFetchableReport + ")");

@@ -28,6 +28,8 @@ VehiclePoseLookup::Config ReporterPoseConfigOf(const HazardReporter::Config& con
 }
 
 constexpr std::size_t kMaxWaitingNotices = 20000;
+/// Messages; what is dropped is asked again.
+constexpr std::size_t kMaxWaitingCellNews = 1000;
 /// Sights from so many times too far away, or too uncertain, still help a hazard's place.
 constexpr double kSightReach = 3.0;
 /// Of fixes that stand in for fused poses: with the same limit more of what is passed at the start
@@ -50,7 +52,8 @@ HazardReporter::HazardReporter(const Config& config, const protocol::HazardCatal
       passes_(config.passes, catalogue),
       settling_({config.settle_wait_s, config.settle_sigma_m}, catalogue),
       start_ns_(now_ns),
-      start_steady_s_(steady_s) {
+      start_steady_s_(steady_s),
+      cells_(config.cells) {
   config_.projection.max_range_m = kEndlessRangeM;
   for (const auto& pending : map_.Pending()) {
     const int urgency = catalogue_.Get(pending.class_name).urgency;
@@ -182,6 +185,7 @@ void HazardReporter::AddDepth(std::int64_t stamp_ns, const placement::DepthImage
 
 void HazardReporter::Process(double now_s, double steady_s) {
   ApplyNotices();
+  ApplyCellNews(steady_s);
   ForgetWhatNobodyTells(now_s);
   while (!waiting_.empty() && Advance(waiting_.front(), now_s, steady_s)) waiting_.pop_front();
   // All of them, so that none waits for its picture only after the one before it has waited.
@@ -436,6 +440,37 @@ void HazardReporter::ApplyNotices() {
   } catch (const StoreError& error) {
     TellStoreError(error);  // They stay and are tried again.
   }
+}
+
+void HazardReporter::AddCellNews(const protocol::CellNews& news) {
+  cell_news_.push_back(news);
+  if (cell_news_.size() > kMaxWaitingCellNews) cell_news_.pop_front();
+}
+
+void HazardReporter::ApplyCellNews(double steady_s) {
+  try {
+    for (; !cell_news_.empty(); cell_news_.pop_front()) {
+      const protocol::CellNews& news = cell_news_.front();
+      if (news.cells.empty()) cells_.AskAgain(news.zone);
+      const LocalHazardMap::CellUse use = map_.Apply(news);
+      counters_.invalid_notices += use.unusable;
+      counters_.cell_answers += use.known.size();
+      for (const geo::MapCell& cell : use.known) cells_.NoteAnswer(news.zone, cell, steady_s);
+    }
+  } catch (const StoreError& error) {
+    TellStoreError(error);  // It stays and is tried again.
+  }
+}
+
+std::vector<protocol::CellRequest> HazardReporter::TakeCellRequests(double steady_s) {
+  auto requests = cells_.TakeDue(steady_s, [this](const std::string& zone,
+                                                  const geo::MapCell& cell) {
+    return CellFollower::Knowledge{map_.cell_sequence(zone, cell), map_.has_cell_gap(zone, cell)};
+  });
+  for (const protocol::CellRequest& request : requests) {
+    counters_.cell_requests += request.cells.size();
+  }
+  return requests;
 }
 
 /// Once a minute of the stamps' clock.

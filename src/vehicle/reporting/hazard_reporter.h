@@ -25,6 +25,7 @@
 #include "vehicle/outbox/zone_finder.h"
 #include "vehicle/pictures/picture_order.h"
 #include "vehicle/positioning/vehicle_pose_lookup.h"
+#include "vehicle/reporting/cell_follower.h"
 #include "vehicle/reporting/local_hazard_map.h"
 #include "vehicle/reporting/pass_sights.h"
 #include "vehicle/reporting/settling_reports.h"
@@ -109,6 +110,7 @@ class HazardReporter {
     geo::GroundProjectionNoise projection;
     ResendSchedule::Config resend;
     LocalHazardMap::Config map;
+    CellFollower::Config cells;
   };
 
   /// Since the start; sightings unless it says otherwise.
@@ -134,6 +136,8 @@ class HazardReporter {
     std::uint64_t refused = 0;    ///< Reports that the zone will never accept.
     std::uint64_t notices = 0;
     std::uint64_t invalid_notices = 0;
+    std::uint64_t cell_requests = 0;  ///< Cells that a zone was asked about.
+    std::uint64_t cell_answers = 0;   ///< Cells that a zone told.
     /// Hazards that the zone took in and never announced.
     std::uint64_t forgotten_unannounced = 0;
     std::uint64_t redirected = 0;  ///< Reports whose zone is gone, sent to the one of their place.
@@ -192,6 +196,19 @@ class HazardReporter {
   }
   void SetLink(LinkCost link) { link_ = link; }
   void AddNotice(const protocol::Notice& notice);
+  /// What a zone told of cells of the map.
+  void AddCellNews(const protocol::CellNews& news);
+  /// The vehicle is at a valid position. Returns whether it wants to hear of other cells than
+  /// before: those of cells().wanted().
+  bool FollowCells(const geo::GeoPoint& position) { return cells_.MoveTo(position); }
+  /// As CellFollower::SetHeard.
+  void SetCellsHeard(const std::string& zone, const std::vector<geo::MapCell>& cells) {
+    cells_.SetHeard(zone, cells);
+  }
+  /// As CellFollower::SetZones.
+  void SetZonesNear(const std::vector<std::string>& zones) { cells_.SetZones(zones); }
+  /// What zones are to be asked about cells now.
+  std::vector<protocol::CellRequest> TakeCellRequests(double steady_s);
   void AddReceipt(const protocol::Receipt& receipt);
 
   /// Works off waiting notices and frames, in their order.
@@ -210,6 +227,7 @@ class HazardReporter {
   const PoseTrack& poses() const { return vehicle_poses_.poses(); }
   const Config& config() const { return config_; }
   const LocalHazardMap& map() const { return map_; }
+  const CellFollower& cells() const { return cells_; }
   const Counters& counters() const { return counters_; }
   std::size_t waiting_frames() const { return waiting_.size(); }
   /// Reports that wait for further sights of their hazards.
@@ -255,6 +273,7 @@ class HazardReporter {
   bool IsCheap(double steady_s) const;
   std::int64_t UtcNs(double steady_s) const;
   void ApplyNotices();
+  void ApplyCellNews(double steady_s);
   void ForgetWhatNobodyTells(double now_s);
   std::optional<protocol::Report> LoadToSend(const Uuid& uuid);
   void TellStoreError(const StoreError& error);
@@ -281,6 +300,8 @@ class HazardReporter {
   std::int64_t start_ns_;  // UTC at the start...
   double start_steady_s_;  // ...and the steady clock then.
   std::deque<protocol::Notice> notices_;
+  std::deque<protocol::CellNews> cell_news_;
+  CellFollower cells_;
   std::optional<double> forgot_s_;  // When ForgetUnannounced last looked.
   Counters counters_;
   std::string store_error_;

@@ -42,7 +42,10 @@ const std::vector<std::string>& LocalHazardMapMigrations() {
                   "  map_sequence INTEGER NOT NULL) WITHOUT ROWID;"
                   "INSERT OR IGNORE INTO zones(zone,map_sequence) SELECT '',map_sequence FROM zone;"
                   "DROP TABLE zone;") +
-          kAddZoneOfReport};
+          kAddZoneOfReport,
+      // Of cells of the map each counts for itself, too.
+      "CREATE TABLE cells(zone TEXT NOT NULL, cell INTEGER NOT NULL, sequence INTEGER NOT NULL,"
+      "  PRIMARY KEY(zone, cell)) WITHOUT ROWID;"};
   return migrations;
 }
 
@@ -51,6 +54,10 @@ constexpr int kGoneKept = 10000;
 constexpr std::size_t kMaxTold = 200000;
 /// Zones of which anything is remembered; a zone directory has no more.
 constexpr std::size_t kMaxZones = 5000;
+/// Cells of which the vehicle remembers how far it knows them: some 10 000 square kilometres.
+constexpr std::size_t kMaxCells = 20000;
+/// As the tables take them (row_validation).
+constexpr std::uint64_t kMaxStoredSequence = (std::uint64_t{1} << 60) - 1;
 
 bool IsUsableNotice(const protocol::Notice& notice) {
   if (notice.sequence > std::numeric_limits<std::int64_t>::max()) return false;
@@ -92,19 +99,22 @@ void LocalHazardMap::GiveRowsTheirZone() {
       database_->Execute(
           std::string("UPDATE known SET zone='', sequence=min(sequence,1) WHERE zone<>'';"
                       "DELETE FROM gone WHERE zone<>''; DELETE FROM zones WHERE zone<>'';"
+                      "DELETE FROM cells WHERE zone<>'';"
                       "UPDATE pending SET zone='' WHERE zone<>'' AND ") +
           kZoneColumnIsValid);
     });
     return;
   }
   database_->Transaction([&] {
-    for (const char* table : {"known", "pending", "gone", "zones"}) {
+    for (const char* table : {"known", "pending", "gone", "zones", "cells"}) {
       // Where the zone has a row of its own, that is the newer one.
       database_->Prepare(std::string("UPDATE OR IGNORE ") + table + " SET zone=? WHERE zone=''")
           .Bind(1, config_.zone)
           .Execute();
     }
-    database_->Execute("DELETE FROM gone WHERE zone=''; DELETE FROM zones WHERE zone='';");
+    database_->Execute(
+        "DELETE FROM gone WHERE zone=''; DELETE FROM zones WHERE zone='';"
+        "DELETE FROM cells WHERE zone='';");
   });
 }
 
@@ -135,6 +145,12 @@ void LocalHazardMap::LoadFilter() {
   while (zones.Step() && zones_.size() < kMaxZones) {
     zones_[zones.Text(0)].chain = NoticeSequenceTracker(static_cast<std::uint64_t>(zones.Int(1)));
   }
+  cells_.clear();
+  SqliteStatement cells = database_->Prepare("SELECT zone,cell,sequence FROM cells");
+  while (cells.Step() && cells_.size() < kMaxCells) {
+    cells_[{cells.Text(0), static_cast<std::uint32_t>(cells.Int(1))}] =
+        NoticeSequenceTracker(static_cast<std::uint64_t>(cells.Int(2)));
+  }
   CountPending();
 }
 
@@ -164,14 +180,16 @@ LocalHazardMap::AddResult LocalHazardMap::Add(const protocol::Report& report,
     return AddResult::kFull;
   }
   std::vector<Change> changes = {{report.uuid, true, report.class_name, report.position}};
+  Chains cells;
   protocol::Report stored = report;
   stored.zone = ZoneOf(report.zone);
   database_->Transaction([&] {
     InsertKnown(stored, stored.zone);
     InsertReport(*database_, stored, hold_until_ns);
-    EvictBeyondLimit(changes);
+    EvictBeyondLimit(changes, cells);
   });
   Show(changes);
+  for (auto& [key, chain] : cells) cells_[key] = std::move(chain);
   ++pending_count_;
   pending_bytes_ += bytes;
   return AddResult::kAdded;
@@ -209,18 +227,33 @@ void LocalHazardMap::Forget(const Uuid& id, std::vector<Change>& changes) {
   changes.push_back({id, false, "", {}});
 }
 
-void LocalHazardMap::EvictBeyondLimit(std::vector<Change>& changes) {
+/// Of a cell of which something is forgotten the vehicle does not know all any more.
+void LocalHazardMap::EvictBeyondLimit(std::vector<Change>& changes, Chains& cells) {
   SqliteStatement count = database_->Prepare("SELECT count(*) FROM known");
   count.Step();
   const std::int64_t excess = count.Int(0) - config_.max_known;
   if (excess <= 0) return;
   SqliteStatement oldest = database_->Prepare(
-      "SELECT id FROM known WHERE id NOT IN (SELECT uuid FROM pending WHERE uuid IS NOT NULL)"
-      " ORDER BY news_ns LIMIT ?");
+      "SELECT id,zone,latitude,longitude FROM known"
+      " WHERE id NOT IN (SELECT uuid FROM pending WHERE uuid IS NOT NULL) ORDER BY news_ns LIMIT "
+      "?");
   oldest.Bind(1, excess);
   std::vector<Uuid> evicted;
-  while (oldest.Step()) evicted.push_back(UuidFromBlob(oldest.Blob(0)));
+  std::set<CellKey> evicted_from;
+  while (oldest.Step()) {
+    evicted.push_back(UuidFromBlob(oldest.Blob(0)));
+    const geo::MapCell cell = geo::MapCell::At({oldest.Real(2), oldest.Real(3)});
+    evicted_from.emplace(oldest.Text(1), cell.number());
+  }
   for (const Uuid& id : evicted) Forget(id, changes);
+  for (const CellKey& key : evicted_from) {
+    if (RememberCell(key, cells).known() == 0) continue;
+    cells[key] = NoticeSequenceTracker();
+    database_->Prepare("DELETE FROM cells WHERE zone=? AND cell=?")
+        .Bind(1, key.first)
+        .Bind(2, static_cast<std::int64_t>(key.second))
+        .Execute();
+  }
 }
 
 std::size_t LocalHazardMap::ForgetUnannounced(std::int64_t now_ns) {
@@ -285,8 +318,9 @@ void LocalHazardMap::GiveZone(const Uuid& report, const std::string& zone) {
 
 void LocalHazardMap::ForgetZones(const std::function<bool(const std::string&)>& is_gone) {
   std::vector<std::string> gone;
-  SqliteStatement zones =
-      database_->Prepare("SELECT zone FROM known WHERE of_zone=1 UNION SELECT zone FROM zones");
+  SqliteStatement zones = database_->Prepare(
+      "SELECT zone FROM known WHERE of_zone=1"
+      " UNION SELECT zone FROM zones UNION SELECT zone FROM cells");
   while (zones.Step()) {
     const std::string zone = zones.Text(0);
     if (zone != config_.zone && is_gone(zone)) gone.push_back(zone);
@@ -300,7 +334,7 @@ void LocalHazardMap::ForgetZones(const std::function<bool(const std::string&)>& 
       std::vector<Uuid> told;
       while (rows.Step()) told.push_back(UuidFromBlob(rows.Blob(0)));
       for (const Uuid& id : told) Forget(id, changes);
-      for (const char* table : {"gone", "zones"}) {
+      for (const char* table : {"gone", "zones", "cells"}) {
         database_->Prepare(std::string("DELETE FROM ") + table + " WHERE zone=?")
             .Bind(1, zone)
             .Execute();
@@ -308,7 +342,10 @@ void LocalHazardMap::ForgetZones(const std::function<bool(const std::string&)>& 
     }
   });
   Show(changes);
-  for (const std::string& zone : gone) zones_.erase(zone);
+  for (const std::string& zone : gone) {
+    zones_.erase(zone);
+    cells_.erase(cells_.lower_bound({zone, 0}), cells_.upper_bound({zone, UINT32_MAX}));
+  }
 }
 
 std::vector<LocalHazardMap::PendingReport> LocalHazardMap::Pending() const {
@@ -364,36 +401,176 @@ std::uint64_t LocalHazardMap::map_sequence(const std::string& zone) const {
 
 bool LocalHazardMap::has_gap() const {
   return std::any_of(zones_.begin(), zones_.end(),
-                     [](const auto& zone) { return zone.second.chain.has_gap(); });
+                     [](const auto& zone) { return zone.second.chain.has_gap(); }) ||
+         std::any_of(cells_.begin(), cells_.end(),
+                     [](const auto& cell) { return cell.second.has_gap(); });
+}
+
+std::uint64_t LocalHazardMap::cell_sequence(const std::string& zone,
+                                            const geo::MapCell& cell) const {
+  const auto found = cells_.find({ZoneOf(zone), cell.number()});
+  return found == cells_.end() ? 0 : found->second.known();
+}
+
+bool LocalHazardMap::has_cell_gap(const std::string& zone, const geo::MapCell& cell) const {
+  const auto found = cells_.find({ZoneOf(zone), cell.number()});
+  return found != cells_.end() && found->second.has_gap();
 }
 
 std::size_t LocalHazardMap::Apply(const std::vector<protocol::Notice>& notices) {
-  std::vector<Change> changes;
-  std::map<std::string, ZoneMemory> zones;  // Those that say something here, as they become.
+  Taking taking;
   std::size_t unusable = 0;
-  std::uint64_t beyond_zone = 0;
   database_->Transaction([&] {
     for (const protocol::Notice& notice : notices) {
       const std::string zone = ZoneOf(notice.zone);
-      ZoneMemory* memory = Remember(zone, zones);
+      ZoneMemory* memory = Remember(zone, taking.zones);
       const NoticeUse use =
-          memory == nullptr ? NoticeUse::kUnusable : ApplyNotice(notice, zone, *memory, changes);
+          memory == nullptr ? NoticeUse::kUnusable : ApplyNotice(notice, zone, *memory, taking);
       if (use != NoticeUse::kTaken) ++unusable;
-      if (use == NoticeUse::kBeyondZone) ++beyond_zone;
+      if (use == NoticeUse::kBeyondZone) ++taking.beyond_zone;
     }
-    for (const auto& [zone, memory] : zones) {
-      if (memory.chain.known() == map_sequence(zone)) continue;
-      database_->Prepare("INSERT OR REPLACE INTO zones(zone,map_sequence) VALUES(?,?)")
-          .Bind(1, zone)
-          .Bind(2, static_cast<std::int64_t>(memory.chain.known()))
+    EvictBeyondLimit(taking.changes, taking.cells);
+    WriteSequences(taking);
+  });
+  Keep(std::move(taking));
+  return unusable;
+}
+
+LocalHazardMap::CellUse LocalHazardMap::Apply(const protocol::CellNews& news) {
+  Taking taking;
+  CellUse use;
+  const std::string zone = ZoneOf(news.zone);
+  database_->Transaction([&] {
+    for (const protocol::CellNews::Cell& cell : news.cells) {
+      if (TakeCell(cell, zone, taking, use.unusable)) {
+        use.known.push_back(cell.cell);
+      } else {
+        ++use.unusable;
+      }
+    }
+    EvictBeyondLimit(taking.changes, taking.cells);
+    WriteSequences(taking);
+  });
+  Keep(std::move(taking));
+  return use;
+}
+
+/// False when the cell is not known with this: what the vehicle knew of it was lost meanwhile.
+bool LocalHazardMap::TakeCell(const protocol::CellNews::Cell& cell, const std::string& zone,
+                              Taking& taking, std::size_t& unusable) {
+  NoticeSequenceTracker& chain = RememberCell({zone, cell.cell.number()}, taking.cells);
+  if (cell.sequence > kMaxStoredSequence || cell.since > kMaxStoredSequence) return false;
+  if (!cell.is_whole() && cell.since > chain.known()) return false;
+  const bool began_anew = cell.since > cell.sequence;
+  if (began_anew) {
+    // What the zone said under higher numbers, it said before it began anew.
+    database_->Prepare("DELETE FROM gone WHERE zone=? AND sequence>?")
+        .Bind(1, zone)
+        .Bind(2, static_cast<std::int64_t>(cell.sequence))
+        .Execute();
+    ForgetOfCell(cell, zone, {}, taking.changes);
+  }
+  std::set<Uuid> told;
+  for (const protocol::CellNews::Hazard& hazard : cell.hazards) {
+    protocol::Notice notice;
+    notice.action =
+        hazard.removed ? protocol::Notice::Action::kRemoved : protocol::Notice::Action::kUpdated;
+    notice.sequence = hazard.sequence;
+    notice.hazard_uuid = hazard.hazard_uuid;
+    notice.class_name = hazard.class_name;
+    notice.confidence = hazard.confidence;
+    notice.position = hazard.position;
+    notice.stamp_ns = hazard.stamp_ns;
+    const bool is_usable = hazard.sequence <= kMaxStoredSequence && IsUsableNotice(notice);
+    const NoticeUse use =
+        is_usable ? TakeHazard(notice, zone, taking.changes) : NoticeUse::kUnusable;
+    if (use != NoticeUse::kTaken) ++unusable;
+    if (use == NoticeUse::kBeyondZone) ++taking.beyond_zone;
+    if (!hazard.removed) told.insert(hazard.hazard_uuid);
+  }
+  if (cell.is_whole() && !began_anew) ForgetOfCell(cell, zone, told, taking.changes);
+  if (began_anew) {
+    chain = NoticeSequenceTracker(cell.sequence);
+  } else {
+    chain.CloseTo(cell.sequence);
+  }
+  return true;
+}
+
+/// What the zone said is in the cell, up to the sequence with which all of it was told, and was not
+/// told then; all of it where the zone began anew.
+void LocalHazardMap::ForgetOfCell(const protocol::CellNews::Cell& cell, const std::string& zone,
+                                  const std::set<Uuid>& told, std::vector<Change>& changes) {
+  const bool began_anew = cell.since > cell.sequence;
+  SqliteStatement rows = database_->Prepare(
+      "SELECT id,latitude,longitude FROM known WHERE of_zone=1 AND zone=? AND sequence>0 AND"
+      " sequence<=? AND latitude BETWEEN ? AND ?");
+  rows.Bind(1, zone)
+      .Bind(2, static_cast<std::int64_t>(began_anew ? kMaxStoredSequence : cell.sequence))
+      .Bind(3, cell.cell.SouthDeg())
+      .Bind(4, cell.cell.NorthDeg());
+  std::vector<Uuid> left_out;
+  while (rows.Step()) {
+    const Uuid id = UuidFromBlob(rows.Blob(0));
+    if (told.count(id) != 0) continue;
+    if (geo::MapCell::At({rows.Real(1), rows.Real(2)}) == cell.cell) left_out.push_back(id);
+  }
+  for (const Uuid& id : left_out) Forget(id, changes);
+}
+
+/// Up to where the vehicle knows the zones and cells that said something.
+void LocalHazardMap::WriteSequences(const Taking& taking) {
+  for (const auto& [zone, memory] : taking.zones) {
+    if (memory.chain.known() == map_sequence(zone)) continue;
+    database_->Prepare("INSERT OR REPLACE INTO zones(zone,map_sequence) VALUES(?,?)")
+        .Bind(1, zone)
+        .Bind(2, static_cast<std::int64_t>(memory.chain.known()))
+        .Execute();
+  }
+  for (const auto& [key, chain] : taking.cells) {
+    const auto before = cells_.find(key);
+    if (chain.known() == (before == cells_.end() ? 0 : before->second.known())) continue;
+    database_->Prepare("INSERT OR REPLACE INTO cells(zone,cell,sequence) VALUES(?,?,?)")
+        .Bind(1, key.first)
+        .Bind(2, static_cast<std::int64_t>(key.second))
+        .Bind(3, static_cast<std::int64_t>(chain.known()))
+        .Execute();
+  }
+}
+
+/// What was written is in memory, too.
+void LocalHazardMap::Keep(Taking taking) {
+  Show(taking.changes);
+  beyond_zone_ += taking.beyond_zone;
+  for (auto& [zone, memory] : taking.zones) zones_[zone] = std::move(memory);
+  for (auto& [key, chain] : taking.cells) cells_[key] = std::move(chain);
+  if (cells_.size() > kMaxCells) ForgetOldestCells();
+}
+
+/// A tenth of them, so that it is done seldom. The vehicle is told them anew when it comes near.
+void LocalHazardMap::ForgetOldestCells() {
+  std::vector<std::pair<std::uint64_t, CellKey>> oldest;
+  for (const auto& [key, chain] : cells_) oldest.emplace_back(chain.known(), key);
+  std::sort(oldest.begin(), oldest.end());
+  oldest.resize(kMaxCells / 10);
+  database_->Transaction([&] {
+    for (const auto& [known, key] : oldest) {
+      database_->Prepare("DELETE FROM cells WHERE zone=? AND cell=?")
+          .Bind(1, key.first)
+          .Bind(2, static_cast<std::int64_t>(key.second))
           .Execute();
     }
-    EvictBeyondLimit(changes);
   });
-  Show(changes);
-  beyond_zone_ += beyond_zone;
-  for (auto& [zone, memory] : zones) zones_[zone] = std::move(memory);
-  return unusable;
+  for (const auto& [known, key] : oldest) cells_.erase(key);
+}
+
+/// The cell's chain in `cells`, at first as it is in cells_.
+NoticeSequenceTracker& LocalHazardMap::RememberCell(const CellKey& key, Chains& cells) const {
+  const auto found = cells.find(key);
+  if (found != cells.end()) return found->second;
+  const auto before = cells_.find(key);
+  return cells.emplace(key, before == cells_.end() ? NoticeSequenceTracker() : before->second)
+      .first->second;
 }
 
 /// The zone's entry in `zones`, at first as it is in zones_; null: too many zones.
@@ -409,18 +586,29 @@ LocalHazardMap::ZoneMemory* LocalHazardMap::Remember(
 
 LocalHazardMap::NoticeUse LocalHazardMap::ApplyNotice(const protocol::Notice& notice,
                                                       const std::string& zone, ZoneMemory& memory,
-                                                      std::vector<Change>& changes) {
+                                                      Taking& taking) {
   if (!IsUsableNotice(notice)) return NoticeUse::kUnusable;
   if (notice.action == protocol::Notice::Action::kCaughtUp) {
-    const bool is_complete = CatchUp(notice, zone, memory, changes);
+    const bool is_complete = CatchUp(notice, zone, memory, taking.changes);
     memory.told.clear();
     return is_complete ? NoticeUse::kTaken : NoticeUse::kUnusable;
   }
-  if (notice.vehicle_id.empty()) {
+  if (notice.cell) {
+    // Of a cell, which says nothing of the rest of the zone.
+    RememberCell({zone, notice.cell->number()}, taking.cells)
+        .Add(notice.previous_sequence, notice.sequence);
+  } else if (notice.vehicle_id.empty()) {
     memory.chain.Add(notice.previous_sequence, notice.sequence);
   } else if (memory.told.size() < kMaxTold) {
     memory.told.insert(notice.hazard_uuid);
   }
+  return TakeHazard(notice, zone, taking.changes);
+}
+
+/// What it says of the hazard, if that is news.
+LocalHazardMap::NoticeUse LocalHazardMap::TakeHazard(const protocol::Notice& notice,
+                                                     const std::string& zone,
+                                                     std::vector<Change>& changes) {
   // It came, though it counts for nothing: else its zone would tell it again and again.
   if (IsOfAnotherZone(notice.hazard_uuid, zone)) return NoticeUse::kUnusable;
   const bool is_removed = notice.action == protocol::Notice::Action::kRemoved;
@@ -479,12 +667,17 @@ bool LocalHazardMap::IsOfAnotherZone(const Uuid& hazard, const std::string& zone
 }
 
 bool LocalHazardMap::IsNews(const protocol::Notice& notice, const std::string& zone) const {
+  // One announcement says that a hazard left a cell of the map and came into the next one: so what
+  // is there counts also where it was removed by the same one. No row: sequences begin at 1.
   SqliteStatement query = database_->Prepare(
-      "SELECT max(sequence) FROM (SELECT sequence FROM known WHERE id=?1 AND of_zone=1"
-      " UNION ALL SELECT sequence FROM gone WHERE zone=?2 AND id=?1)");
+      "SELECT coalesce((SELECT sequence FROM known WHERE id=?1 AND of_zone=1),0),"
+      " coalesce((SELECT sequence FROM gone WHERE zone=?2 AND id=?1),0)");
   query.BindBlob(1, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size()).Bind(2, zone);
-  // No row: 0, and sequences begin at 1.
-  return !query.Step() || static_cast<std::int64_t>(notice.sequence) > query.Int(0);
+  if (!query.Step()) return true;
+  const auto sequence = static_cast<std::int64_t>(notice.sequence);
+  const bool is_removed = notice.action == protocol::Notice::Action::kRemoved;
+  return sequence > query.Int(0) &&
+         (is_removed ? sequence > query.Int(1) : sequence >= query.Int(1));
 }
 
 void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::string& zone) {

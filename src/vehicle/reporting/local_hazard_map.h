@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "common/sqlite.h"
+#include "geo/map_cell.h"
+#include "protocol/cell_news.h"
 #include "protocol/duplicate_filter.h"
 #include "protocol/hazard_catalogue.h"
 #include "protocol/notice.h"
@@ -33,7 +35,8 @@ struct KnownHazard {
 };
 
 /// The vehicle's memory: the hazards it knows, its own and those that the zones announced, up to
-/// which of each zone's announcements it knows all, and its reports that their zone has not
+/// which of each zone's announcements it knows all, of the zone and of single cells of the map, and
+/// its reports that their zone has not
 /// answered yet (the outbox). All stand in one durable SQLite database, so that "known" and "to be
 /// sent" are one transaction: what Add accepted is reported whatever dies.
 ///
@@ -102,6 +105,20 @@ class LocalHazardMap {
   /// takes away what its zone no longer has; one that came without all that belongs to it counts as
   /// unusable.
   std::size_t Apply(const std::vector<protocol::Notice>& notices);
+  /// What became of a zone's word about cells of the map.
+  struct CellUse {
+    std::vector<geo::MapCell> known;  ///< Of which the vehicle knows all now.
+    std::size_t unusable = 0;         ///< Hazards and cells that were left out, as for notices.
+  };
+  /// Takes in what a zone told of cells, in one transaction. Where it tells all that is there, what
+  /// it does not tell is forgotten. What answers a question that the vehicle cannot have asked is
+  /// left out.
+  CellUse Apply(const protocol::CellNews& news);
+  /// Up to which announcement of the zone the vehicle knows all of the cell; 0: it knows nothing of
+  /// it. As map_sequence.
+  std::uint64_t cell_sequence(const std::string& zone, const geo::MapCell& cell) const;
+  /// An announcement of the cell came ahead of one that is missing.
+  bool has_cell_gap(const std::string& zone, const geo::MapCell& cell) const;
   /// Whether a place is none of a zone's business (ZoneFinder::is_beyond): what the zone says is
   /// there is left out. What it said before stays until it takes it back.
   void RefuseBeyond(std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond) {
@@ -152,6 +169,10 @@ class LocalHazardMap {
     std::set<Uuid> told;  // To this vehicle alone, since the last kCaughtUp.
   };
 
+  /// A cell of a zone, by its id and the cell's number.
+  using CellKey = std::pair<std::string, std::uint32_t>;
+  using Chains = std::map<CellKey, NoticeSequenceTracker>;
+
   /// What becomes of a notice.
   enum class NoticeUse { kTaken, kUnusable, kBeyondZone };
 
@@ -163,6 +184,14 @@ class LocalHazardMap {
     geo::GeoPoint position;
   };
 
+  /// What one transaction does, for memory after its commit.
+  struct Taking {
+    std::map<std::string, ZoneMemory> zones;  ///< Those that say something, as they become.
+    Chains cells;                             ///< The same of their cells.
+    std::vector<Change> changes;
+    std::uint64_t beyond_zone = 0;  ///< Of what was left out: in another zone's area.
+  };
+
   std::string ZoneOf(const std::string& named) const;
   void GiveRowsTheirZone();
   void RecoverFromSetAside();
@@ -170,8 +199,18 @@ class LocalHazardMap {
   void CountPending();
   void InsertKnown(const protocol::Report& report, const std::string& zone);
   ZoneMemory* Remember(const std::string& zone, std::map<std::string, ZoneMemory>& zones) const;
+  NoticeSequenceTracker& RememberCell(const CellKey& key, Chains& cells) const;
   NoticeUse ApplyNotice(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
-                        std::vector<Change>& changes);
+                        Taking& taking);
+  NoticeUse TakeHazard(const protocol::Notice& notice, const std::string& zone,
+                       std::vector<Change>& changes);
+  bool TakeCell(const protocol::CellNews::Cell& cell, const std::string& zone, Taking& taking,
+                std::size_t& unusable);
+  void ForgetOfCell(const protocol::CellNews::Cell& cell, const std::string& zone,
+                    const std::set<Uuid>& told, std::vector<Change>& changes);
+  void WriteSequences(const Taking& taking);
+  void Keep(Taking taking);
+  void ForgetOldestCells();
   bool IsOfAnotherZone(const Uuid& hazard, const std::string& zone) const;
   bool IsNews(const protocol::Notice& notice, const std::string& zone) const;
   void StoreNotice(const protocol::Notice& notice, const std::string& zone);
@@ -180,7 +219,7 @@ class LocalHazardMap {
   std::vector<Uuid> NotTold(const protocol::Notice& notice, const std::string& zone,
                             const std::set<Uuid>& told) const;
   void Forget(const Uuid& id, std::vector<Change>& changes);
-  void EvictBeyondLimit(std::vector<Change>& changes);
+  void EvictBeyondLimit(std::vector<Change>& changes, Chains& cells);
   void Show(const std::vector<Change>& changes);
 
   Config config_;
@@ -190,7 +229,8 @@ class LocalHazardMap {
   InvalidRows broken_rows_;
   std::unique_ptr<SqliteDatabase> database_;
   protocol::DuplicateFilter filter_;
-  std::map<std::string, ZoneMemory> zones_;                                  // By id.
+  std::map<std::string, ZoneMemory> zones_;  // By id.
+  Chains cells_;
   std::function<bool(const std::string&, const geo::GeoPoint&)> is_beyond_;  // May be empty.
   std::uint64_t beyond_zone_ = 0;
   std::size_t pending_count_ = 0;

@@ -340,9 +340,27 @@ class Flood(Lies):
         return self.reporter.make("flooder", 44 + 0.00001 * (number % 1000), -83, age_s=1)
 
 
+class AskingAlways(Attack):
+    """One vehicle asks about as many cells as it can as fast as it can, and among them about impossible ones."""
+
+    name, clients = "a flood of questions about cells", 20000
+
+    def work(self):
+        for number in range(self.count):
+            if self.stopping.is_set():
+                return
+            self.reporter.ask_cells("asker", [(number * 64 + i) % (1 << 30) for i in range(64)], odd=number % 10 == 0)
+            self.opened += 1
+            if number % 100 == 99:
+                self.stopping.wait(0.05)
+
+    def record(self):
+        return {"asked": self.opened, "answered_cells": self.reporter.cells_told("asker")}
+
+
 HTTP_ATTACKS = (ListsUnread, StreamsUnread, SlowOnes, SlowNeighbours, Crowd, OddRequests, OddFrames, CostlyPictures)
 VEHICLE_ATTACKS = (ManyCities, SpamNames, Flood)
-ATTACKS = HTTP_ATTACKS + VEHICLE_ATTACKS
+ATTACKS = HTTP_ATTACKS + VEHICLE_ATTACKS + (AskingAlways,)
 
 
 def classes_on_map(zone):

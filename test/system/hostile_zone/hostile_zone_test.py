@@ -77,6 +77,13 @@ class HostileZoneTest(unittest.TestCase):
         told = self.records[attacks.Flood.name]["came_of_it"]
         self.assertLessEqual(told["accepted"], 3600)
 
+    def test_who_asks_about_cells_all_the_time_is_told_no_more_than_its_share(self):
+        told = self.records[attacks.AskingAlways.name]["came_of_it"]
+        self.assertGreater(told["asked"], 100)
+        # 256 at once, two more each second of an attack and of the pauses around it.
+        self.assertLessEqual(told["answered_cells"], 256 + 2 * 300)
+        self.assertGreater(told["answered_cells"], 0)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -135,20 +135,37 @@ class Reporter:
 
     def __init__(self):
         import rospy
-        from livemap.msg import HazardReport, ReportReceipt, VehiclePosition
+        from livemap.msg import CellHazards, CellRequest, HazardReport, ReportReceipt, VehiclePosition
         self.rospy, self.report_class, self.position_class = rospy, HazardReport, VehiclePosition
+        self.request_class = CellRequest
         rospy.init_node("hostile_zone", anonymous=True, disable_signals=True)
         self.lock = threading.Lock()
-        self.receipts = {}
+        self.receipts, self.told_cells = {}, {}
         self.subscriber = rospy.Subscriber("hazard/receipt", ReportReceipt, self.keep, queue_size=100000)
         self.publisher = rospy.Publisher("hazard/report", HazardReport, queue_size=100000)
         self.positions = rospy.Publisher("vehicle/position", VehiclePosition, queue_size=10000)
+        self.cell_requests = rospy.Publisher("hazard/cell_request", CellRequest, queue_size=100000)
+        self.cell_subscriber = rospy.Subscriber("hazard/cell_hazards", CellHazards, self.count_cells, queue_size=100000)
         wait_until(lambda: self.publisher.get_num_connections() and self.positions.get_num_connections() and
                    self.subscriber.get_num_connections(), "the zone's subscription to reports")
 
     def keep(self, receipt):
         with self.lock:
             self.receipts[receipt.report_uuid] = receipt
+
+    def count_cells(self, news):
+        with self.lock:
+            self.told_cells[news.vehicle_id] = self.told_cells.get(news.vehicle_id, 0) + len(news.cells)
+
+    def cells_told(self, vehicle):
+        with self.lock:
+            return self.told_cells.get(vehicle, 0)
+
+    def ask_cells(self, vehicle, cells, odd=False):
+        """`odd`: about cells that do not exist, and with too few sequences."""
+        self.cell_requests.publish(self.request_class(
+            schema_version=self.request_class.SCHEMA_VERSION, vehicle_id=vehicle,
+            cells=[0xffffffff - cell for cell in cells] if odd else cells, sequences=[0] * (len(cells) - odd)))
 
     def receipt(self, report):
         with self.lock:

@@ -60,7 +60,7 @@ inline protocol::Notice MakeNotice(protocol::Notice::Action action, int hazard,
 }
 
 /// Gives an outbox the shape that it had before pictures showed a part of the image, reports were
-/// held, and there were several zones.
+/// held, and there were several zones and cells of the map.
 inline void MakeOlder(const std::string& path) {
   SqliteDatabase database(path, /*durable=*/true);
   for (const char* column :
@@ -71,6 +71,7 @@ inline void MakeOlder(const std::string& path) {
       "ALTER TABLE pending DROP COLUMN zone; ALTER TABLE known DROP COLUMN zone;"
       "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
       "INSERT INTO zone SELECT coalesce(max(map_sequence), 0) FROM zones; DROP TABLE zones;"
+      "DROP TABLE cells;"
       "ALTER TABLE gone RENAME TO gone_of_zones;"
       "CREATE TABLE gone(id BLOB PRIMARY KEY, sequence INTEGER NOT NULL) WITHOUT ROWID;"
       "INSERT INTO gone SELECT id,sequence FROM gone_of_zones; DROP TABLE gone_of_zones;"
