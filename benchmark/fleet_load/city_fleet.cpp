@@ -1,5 +1,7 @@
 #include "fleet_load/city_fleet.h"
 
+#include <livemap/CellHazards.h>
+#include <livemap/CellRequest.h>
 #include <livemap/HazardNotice.h>
 #include <livemap/HazardPoll.h>
 #include <livemap/HazardPollAnswer.h>
@@ -14,6 +16,7 @@
 
 #include "common/clock.h"
 #include "common/error.h"
+#include "ros/conversions/cell_conversions.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/poll_conversions.h"
 #include "zone_messages.h"
@@ -54,6 +57,9 @@ CityFleet::CityFleet(const Config& config, Movement movement)
                           },
                           [this](std::size_t, const std::string& reason) {
                             if (result_.lost++ == 0) result_.first_loss = reason;
+                          },
+                          [this](std::size_t client, const std::vector<std::string>& topics) {
+                            OnFollowed(client, topics);
                           }}) {
   while (standing_.size() < config_.hazards) {
     if (const auto hazard = hazards_.Add(movement_.RandomPlace(random_))) {
@@ -73,6 +79,7 @@ std::size_t CityFleet::AddClient(const std::string& id, const std::string& zone_
   std::vector<transport::MqttSubscription> subscriptions = {{vehicle.topics + "receipt", 1},
                                                             {vehicle.topics + "notice", 1},
                                                             {vehicle.topics + "poll", 1},
+                                                            {vehicle.topics + "cell_hazards", 1},
                                                             {vehicle.topics + "change_receipt", 1}};
   if (!zone_notices.empty()) subscriptions.push_back({zone_notices, 1});
   vehicles_.push_back(std::move(vehicle));
@@ -156,7 +163,7 @@ void CityFleet::Connect() {
   const std::size_t first = loop_.size();
   for (std::size_t i = 0; i < movement_.config().vehicles; ++i) {
     AddClient("car-" + std::to_string(config_.first_vehicle + i),
-              "livemap/v1/" + config_.zone + "/notice");
+              config_.by_cells ? "" : "livemap/v1/" + config_.zone + "/notice");
     if (i % 50 == 0) loop_.Poll(0);
   }
   AwaitLogins(first);
@@ -253,6 +260,68 @@ void CityFleet::SendPosition(std::size_t client, const VehicleStep& step) {
       loop_.Publish(client, vehicle.topics + "position",
                     Enclose(ros_io::ToMessage(state, 1.0, vehicle.chain.known())), 0);
   if (counting_ && is_sent) ++result_.positions;
+  if (config_.by_cells) FollowCells(client, state.position);
+}
+
+void CityFleet::FollowCells(std::size_t client, const geo::GeoPoint& position) {
+  Vehicle& vehicle = vehicles_[client];
+  if (vehicle.cells.MoveTo(position)) {
+    std::vector<std::string> topics;
+    for (const geo::MapCell& cell : vehicle.cells.wanted()) {
+      topics.push_back("livemap/v1/" + config_.zone + "/notice/" + cell.Quadkey());
+    }
+    loop_.Follow(client, topics);
+  }
+  const auto knowledge_of = [&vehicle](const std::string&, const geo::MapCell& cell) {
+    const vehicle::NoticeSequenceTracker& chain = vehicle.cell_chains[cell.number()];
+    return vehicle::CellFollower::Knowledge{chain.known(), chain.has_gap()};
+  };
+  const double now_s = static_cast<double>(SteadyNs()) * 1e-9;
+  for (const protocol::CellRequest& request : vehicle.cells.TakeDue(now_s, knowledge_of)) {
+    loop_.Publish(client, vehicle.topics + "cell_request", Enclose(ros_io::ToMessage(request)), 1);
+  }
+}
+
+void CityFleet::OnFollowed(std::size_t client, const std::vector<std::string>& topics) {
+  std::vector<geo::MapCell> cells;
+  for (const std::string& topic : topics) {
+    const auto cell =
+        geo::MapCell::FromQuadkey(std::string_view(topic).substr(topic.rfind('/') + 1));
+    if (cell) cells.push_back(*cell);
+  }
+  vehicles_[client].cells.SetHeard("", cells);
+}
+
+/// As LocalHazardMap takes it, but for its disk.
+void CityFleet::OnCellHazards(std::size_t client, const transport::MqttMessage& message) {
+  Vehicle& vehicle = vehicles_[client];
+  const protocol::CellNews news = ros_io::FromMessage(Open<CellHazards>(message));
+  if (counting_) result_.told_bytes += message.topic.size() + message.payload.size;
+  if (news.cells.empty()) vehicle.cells.AskAgain("");
+  for (const protocol::CellNews::Cell& cell : news.cells) {
+    vehicle::NoticeSequenceTracker& chain = vehicle.cell_chains[cell.cell.number()];
+    if (!cell.is_whole() && cell.since > chain.known()) continue;
+    chain.CloseTo(cell.sequence);
+    vehicle.cells.NoteAnswer("", cell.cell, static_cast<double>(SteadyNs()) * 1e-9);
+    if (counting_) {
+      ++result_.cells_told;
+      result_.told += cell.hazards.size();
+    }
+    for (const protocol::CellNews::Hazard& hazard : cell.hazards) {
+      if (hazard.removed) continue;  // It has no place; the vehicle takes it for there.
+      const auto number = hazards_.FindAt(city_.ToEnu(hazard.position));
+      if (!number) continue;
+      if (vehicle.knows.size() <= *number) vehicle.knows.resize(hazards_.size());
+      vehicle.knows[*number] = true;
+    }
+  }
+  if (vehicle.cells.heard() > 0 && vehicle.cells.unanswered() == 0) NoteJoin(vehicle);
+}
+
+void CityFleet::NoteJoin(Vehicle& vehicle) {
+  if (vehicle.has_joined) return;
+  vehicle.has_joined = true;
+  result_.join_s.push_back(MillisecondsSinceNs(vehicle.login_ns) * 1e-3);
 }
 
 /// Reports what it passes and does not know.
@@ -325,6 +394,8 @@ void CityFleet::OnMessage(std::size_t client, const transport::MqttMessage& mess
     OnNoticeToAll(client, message);
   } else if (EndsWith(message.topic, "/notice")) {
     OnOwnNotice(client, message);
+  } else if (EndsWith(message.topic, "/cell_hazards")) {
+    OnCellHazards(client, message);
   } else if (EndsWith(message.topic, "/receipt")) {
     OnReceipt(client, message);
   } else if (EndsWith(message.topic, "/poll")) {
@@ -361,8 +432,9 @@ const CityFleet::Announcement& CityFleet::Decode(const transport::MqttMessage& m
   announcement.payload.assign(message.payload.data, message.payload.data + message.payload.size);
   announcement.notice = ros_io::FromMessage(Open<HazardNotice>(message));
   announcement.hazard = hazards_.FindAt(city_.ToEnu(announcement.notice.position));
-  const auto [entry, is_new] =
-      announcements_.emplace(announcement.notice.sequence, std::move(announcement));
+  const std::pair key{announcement.notice.sequence,
+                      geo::MapCell::At(announcement.notice.position).number()};
+  const auto [entry, is_new] = announcements_.emplace(key, std::move(announcement));
   if (!is_new) return entry->second;
   Announcement& added = entry->second;
   if (added.hazard && added.notice.sightings > sightings_[*added.hazard]) {
@@ -371,16 +443,20 @@ const CityFleet::Announcement& CityFleet::Decode(const transport::MqttMessage& m
   }
   if (counting_) ++result_.announcements;
   if (announcements_.size() > kKeptAnnouncements) {
-    const std::uint64_t oldest = announcements_.begin()->first;
-    if (oldest != entry->first) announcements_.erase(announcements_.begin());
+    if (announcements_.begin() != entry) announcements_.erase(announcements_.begin());
   }
   return added;
 }
 
+/// Or to the vehicles of a cell.
 void CityFleet::OnNoticeToAll(std::size_t client, const transport::MqttMessage& message) {
   Vehicle& vehicle = vehicles_[client];
   const Announcement& announcement = Decode(message);
-  vehicle.chain.Add(announcement.notice.previous_sequence, announcement.notice.sequence);
+  const bool is_of_cell = !EndsWith(message.topic, "/notice");
+  vehicle::NoticeSequenceTracker& chain =
+      is_of_cell ? vehicle.cell_chains[geo::MapCell::At(announcement.notice.position).number()]
+                 : vehicle.chain;
+  chain.Add(announcement.notice.previous_sequence, announcement.notice.sequence);
   Learn(vehicle, announcement.notice, announcement.hazard);
   if (!counting_) return;
   const std::size_t bytes = message.topic.size() + message.payload.size;
@@ -414,9 +490,7 @@ void CityFleet::OnOwnNotice(std::size_t client, const transport::MqttMessage& me
   } else {
     vehicle.chain.CloseTo(notice.sequence);
   }
-  if (vehicle.has_joined) return;
-  vehicle.has_joined = true;
-  result_.join_s.push_back(MillisecondsSinceNs(vehicle.login_ns) * 1e-3);
+  NoteJoin(vehicle);
 }
 
 void CityFleet::Learn(Vehicle& vehicle, const protocol::Notice& notice,

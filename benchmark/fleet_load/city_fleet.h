@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "common/uuid.h"
@@ -18,6 +19,7 @@
 #include "geo/wgs84.h"
 #include "protocol/notice.h"
 #include "protocol/poll.h"
+#include "vehicle/reporting/cell_follower.h"
 #include "vehicle/reporting/notice_sequence_tracker.h"
 
 namespace livemap::bench {
@@ -43,6 +45,8 @@ class CityFleet {
     std::size_t first_vehicle = 0;  ///< Logins are car-N from here on.
     std::size_t hazards = 10000;    ///< In the city at first.
     double births_per_s = 2;        ///< New hazards; as many end.
+    /// Vehicles hear of the cells of the map around them; else of all hazards of the zone.
+    bool by_cells = true;
     std::uint64_t seed = 1;
   };
 
@@ -70,12 +74,14 @@ class CityFleet {
     std::vector<double> ahead_ms;
     std::vector<double> up_bytes;  ///< Per vehicle, over its TCP connection.
     std::vector<double> down_bytes;
-    std::uint64_t notice_bytes =
-        0;  ///< MQTT payload and topic of notices to everybody, all vehicles.
+    /// MQTT payload and topic of notices to everybody or to a cell's vehicles, all vehicles.
+    std::uint64_t notice_bytes = 0;
     std::uint64_t near_notice_bytes = 0;  ///< Of them, of hazards within kNearM of the hearer.
     std::uint64_t told_bytes = 0;         ///< The same of notices to one vehicle.
     std::uint64_t told = 0;               ///< Hazards told to single vehicles.
-    std::vector<double> join_s;  ///< Since the start: from login to the first whole CAUGHT_UP.
+    std::uint64_t cells_told = 0;         ///< The same of cells of the map.
+    /// Since the start: from login until the vehicle knows all around it for the first time.
+    std::vector<double> join_s;
   };
 
   static constexpr double kAheadM = 500;
@@ -102,6 +108,8 @@ class CityFleet {
     std::string topics;  ///< Where its own begin.
     std::int64_t login_ns = 0;
     vehicle::NoticeSequenceTracker chain;
+    vehicle::CellFollower cells{vehicle::CellFollower::Config{}};
+    std::map<std::uint32_t, vehicle::NoticeSequenceTracker> cell_chains;  ///< By cell's number.
     std::set<Uuid> told;      ///< Since the last CAUGHT_UP.
     std::vector<bool> knows;  ///< By the number of the hazard.
     std::vector<protocol::Poll> polls;
@@ -123,6 +131,10 @@ class CityFleet {
   void OnMessage(std::size_t client, const transport::MqttMessage& message);
   void OnNoticeToAll(std::size_t client, const transport::MqttMessage& message);
   void OnOwnNotice(std::size_t client, const transport::MqttMessage& message);
+  void OnCellHazards(std::size_t client, const transport::MqttMessage& message);
+  void OnFollowed(std::size_t client, const std::vector<std::string>& topics);
+  void FollowCells(std::size_t client, const geo::GeoPoint& position);
+  void NoteJoin(Vehicle& vehicle);
   void OnReceipt(std::size_t client, const transport::MqttMessage& message);
   const Announcement& Decode(const transport::MqttMessage& message);
   void Learn(Vehicle& vehicle, const protocol::Notice& notice, std::optional<std::uint32_t> hazard);
@@ -139,11 +151,12 @@ class CityFleet {
   const geo::LocalFrame city_;
   std::mt19937_64 random_;
   CityHazards hazards_;
-  std::vector<std::uint32_t> standing_;                  ///< Hazards that are there.
-  std::vector<std::int64_t> last_report_ns_;             ///< By hazard: when it was sent.
-  std::vector<std::uint32_t> sightings_;                 ///< By hazard: as announced last.
-  std::map<std::uint64_t, Announcement> announcements_;  ///< The newest, by sequence.
-  std::vector<Vehicle> vehicles_;                        ///< By client.
+  std::vector<std::uint32_t> standing_;       ///< Hazards that are there.
+  std::vector<std::int64_t> last_report_ns_;  ///< By hazard: when it was sent.
+  std::vector<std::uint32_t> sightings_;      ///< By hazard: as announced last.
+  /// The newest, by sequence and number of the cell: one may tell two cells of a hazard.
+  std::map<std::pair<std::uint64_t, std::uint32_t>, Announcement> announcements_;
+  std::vector<Vehicle> vehicles_;  ///< By client.
   bool counting_ = false;
   std::int64_t start_ns_ = 0;  ///< Of the drive.
   Result result_;

@@ -10,6 +10,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <set>
 #include <utility>
 // The system's own structure: that of netinet has no counters of bytes.
 #include <linux/tcp.h>
@@ -32,7 +34,10 @@ struct ClientLoop::Connection {
   transport::MosquittoHandle handle;
   int socket = -1;
   std::size_t granted = 0;
-  std::uint64_t callbacks = 0;  ///< So far: whether a reading brought anything.
+  std::set<std::string> followed;
+  std::map<int, std::string> asking;  ///< Of them, not answered yet, by packet id.
+  std::set<std::string> heard;        ///< Of them, granted.
+  std::uint64_t callbacks = 0;        ///< So far: whether a reading brought anything.
   bool is_lost = false;
   bool waits_to_write = false;
 };
@@ -101,6 +106,29 @@ bool ClientLoop::Publish(std::size_t client, const std::string& topic,
   }
   Flush(connection);
   return true;
+}
+
+void ClientLoop::Follow(std::size_t client, const std::vector<std::string>& topics) {
+  Connection& connection = *connections_[client];
+  if (connection.is_lost) return;
+  mosquitto* const handle = connection.handle.get();
+  const std::set<std::string> wanted(topics.begin(), topics.end());
+  for (auto topic = connection.followed.begin(); topic != connection.followed.end();) {
+    if (wanted.count(*topic) != 0) {
+      ++topic;
+      continue;
+    }
+    mosquitto_unsubscribe_v5(handle, nullptr, topic->c_str(), nullptr);
+    connection.heard.erase(*topic);
+    topic = connection.followed.erase(topic);
+  }
+  for (const std::string& topic : wanted) {
+    if (!connection.followed.insert(topic).second) continue;
+    int id = 0;
+    mosquitto_subscribe_v5(handle, &id, topic.c_str(), 1, 0, nullptr);
+    connection.asking[id] = topic;
+  }
+  Flush(connection);
 }
 
 void ClientLoop::Poll(int timeout_ms) {
@@ -194,10 +222,23 @@ void ClientLoop::OnConnect(mosquitto* handle, void* self, int reason, int /*flag
   }
 }
 
-void ClientLoop::OnSubscribe(mosquitto* /*handle*/, void* self, int /*id*/, int count,
+void ClientLoop::OnSubscribe(mosquitto* /*handle*/, void* self, int id, int count,
                              const int* granted, const mosquitto_property* /*properties*/) {
   auto& connection = *static_cast<Connection*>(self);
   ++connection.callbacks;
+  const auto asking = connection.asking.find(id);
+  if (asking != connection.asking.end()) {
+    const bool is_granted = count == 1 && granted[0] < MQTT_RC_UNSPECIFIED;
+    if (is_granted && connection.followed.count(asking->second) != 0) {
+      connection.heard.insert(asking->second);
+    }
+    connection.asking.erase(asking);
+    if (connection.asking.empty() && connection.loop->events_.on_followed) {
+      connection.loop->events_.on_followed(connection.number,
+                                           {connection.heard.begin(), connection.heard.end()});
+    }
+    return;
+  }
   for (int i = 0; i < count; ++i) {
     if (granted[i] < MQTT_RC_UNSPECIFIED) ++connection.granted;
   }

@@ -25,6 +25,8 @@ class ClientLoop {
   struct Events {
     std::function<void(std::size_t client, const transport::MqttMessage&)> on_message;
     std::function<void(std::size_t client, const std::string& reason)> on_lost;
+    /// Of the topics of Follow, those that the broker has granted; whenever they are others.
+    std::function<void(std::size_t client, const std::vector<std::string>& topics)> on_followed;
   };
   /// What went over a client's TCP connection.
   struct Traffic {
@@ -46,6 +48,8 @@ class ClientLoop {
   /// False when the connection is lost.
   bool Publish(std::size_t client, const std::string& topic,
                const std::vector<std::uint8_t>& payload, int qos);
+  /// As transport::MqttClient::Follow, with QoS 1.
+  void Follow(std::size_t client, const std::vector<std::string>& topics);
   /// Waits up to `timeout_ms` for the network and does what there is to do.
   void Poll(int timeout_ms);
   Traffic TrafficOf(std::size_t client) const;

@@ -51,6 +51,7 @@ void PrintFleetJson(std::size_t vehicles, const CityFleet::Result& result) {
   PrintCount("notices", result.notice_ms.size());
   PrintCount("notices_ahead", result.ahead_ms.size());
   PrintCount("told", result.told);
+  PrintCount("cells_told", result.cells_told);
   PrintCount("joined", result.join_s.size());
   PrintFleetQuantiles("position_late_ms", result.late_ms);
   PrintFleetQuantiles("receipt_ms", result.receipt_ms);
@@ -92,6 +93,7 @@ int Run(int argc, char** argv) {
        {"hazards", "N", "hazards in the city at first (10000)"},
        {"surveyed", "", "the zone has them on its map, by an earlier run with the same --hazards"},
        {"births", "R", "new hazards per second, and as many that end (2)"},
+       {"to-all", "", "vehicles hear of all hazards of the zone, not of the cells around them"},
        {"trace", "FILE", "how the vehicles move; without it they turn at random"},
        {"warm-up", "SECONDS", "driven before the measurement (20)"},
        {"seconds", "SECONDS", "measured (60)"}});
@@ -111,6 +113,7 @@ int Run(int argc, char** argv) {
   config.first_vehicle = static_cast<std::size_t>(line.Whole("first-vehicle", 0, 0, 1000000));
   config.hazards = static_cast<std::size_t>(line.Whole("hazards", 10000, 1, 40000));
   config.births_per_s = line.Number("births", 2, 0, 1000);
+  config.by_cells = !line.Has("to-all");
   const double warm_up_s = line.Number("warm-up", 20, 0, 600);
   const double seconds = line.Number("seconds", 60, 1, 3600);
   Movement::Config drive;
