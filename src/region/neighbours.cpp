@@ -1,17 +1,20 @@
 #include "region/neighbours.h"
 
-#include <algorithm>
-#include <cstddef>
 #include <map>
 #include <utility>
 
+#include "common/clock.h"
 #include "common/error.h"
+#include "common/time.h"
 #include "region/zone_list.h"
 
 namespace livemap::region {
 namespace {
 
 constexpr double kMaxMarginM = 20'000;
+constexpr std::size_t kHazardsPerRead = 1000;
+/// However many ask, the list is made so often.
+constexpr double kListAgeS = 1;
 
 Neighbours::Config CheckedNeighbours(Neighbours::Config config) {
   // Written so that NaN is refused, too.
@@ -47,8 +50,12 @@ Neighbours::Neighbours(Config config, const zone::ZoneService& zone,
       now_ns_(std::move(now_ns)),
       log_(std::move(log)),
       file_(directory::TrustedAuthority::Read(config_.authority), config_.directory, now_ns_) {
-  Renew();
-  if (!directory_) {
+  try {
+    Renew();
+  } catch (const Error& error) {
+    log_(error.what());
+  }
+  if (!file_.directory()) {
     log_("there is no valid zone directory at '" + config_.directory +
          "' yet: nobody is followed until there is");
   }
@@ -78,71 +85,93 @@ void Neighbours::Renew() {
   if (file_.ReadIfChanged() && !file_.damage().empty()) log_(file_.damage());
   auto directory = file_.directory();
   if (directory == directory_) return;
-  directory_ = std::move(directory);
+  // Until the new one is followed: what fails is tried again.
+  directory_ = nullptr;
   {
-    // Before the next one: both would write one store.
-    const MutexLock lock(mutex_);
-    region_.reset();
+    std::unique_ptr<Region> former;
+    const WriterLock lock(mutex_);
+    former.swap(region_);
+    // It ends before the next one begins, because both would write one store; nobody reads it now.
   }
-  if (!directory_) return log_("the zone directory has expired: nobody is followed");
+  if (!directory) return log_("the zone directory has expired: nobody is followed");
   Region::Config config;
-  config.zones = ZonesAround(*directory_);
-  if (config.zones.empty()) return;
+  config.zones = ZonesAround(*directory);
   config.directory = config_.store;
   config.ca_file = config_.ca_file;
   config.ask_every_s = config_.ask_every_s;
-  auto region = std::make_shared<Region>(std::move(config), catalogue_, now_ns_, log_);
-  const MutexLock lock(mutex_);
+  std::unique_ptr<Region> region;
+  if (!config.zones.empty()) {
+    region = std::make_unique<Region>(std::move(config), catalogue_, now_ns_, log_);
+  }
+  directory_ = std::move(directory);
+  const WriterLock lock(mutex_);
   region_ = std::move(region);
 }
 
-std::shared_ptr<Region> Neighbours::region() const {
-  const MutexLock lock(mutex_);
-  return region_;
+protocol::DuplicateFilter Neighbours::OwnAround(const std::deque<zone::Hazard>& hazards) const {
+  protocol::DuplicateFilter own(catalogue_);
+  if (hazards.empty()) return own;
+  zone::Walk<zone::HazardState> walk;
+  walk.states = zone::StatesOnMap();
+  walk.until = zone_.Sequence();
+  for (bool is_last = false; !is_last;) {
+    const auto page = zone_.ReadHazards(walk, kHazardsPerRead);
+    walk.after = page.sequence;
+    is_last = page.is_last;
+    for (const zone::Hazard& hazard : page.items) {
+      if (!zone::IsTold(hazard.state)) continue;
+      own.Put(hazard.uuid, catalogue_.HeadingOf(hazard.class_name), hazard.position);
+    }
+  }
+  return own;
 }
 
-bool Neighbours::IsOwn(const zone::Hazard& hazard) const {
-  // Others may lie nearer that are of another class.
-  constexpr std::size_t kNearest = 50;
-  const auto near =
-      zone_.QueryNear(hazard.position, catalogue_.DuplicateRadiusM(hazard.class_name), kNearest);
-  return std::any_of(near.begin(), near.end(), [this, &hazard](const zone::Hazard& own) {
-    return catalogue_.HeadingOf(own.class_name) == hazard.class_name;
-  });
-}
-
-std::vector<web::NeighbourHazard> Neighbours::Hazards() const {
-  const std::shared_ptr<Region> region = this->region();
-  if (!region) return {};
+std::vector<web::NeighbourHazard> Neighbours::Read() const {
+  std::vector<web::NeighbourHazard> list;
+  if (!region_) return list;
   std::map<std::string, const RegionZone*> zones;
-  for (std::size_t i = 0; i < region->zones(); ++i) zones[region->zone(i).id] = &region->zone(i);
-  const RegionMap& map = region->map();
-  std::vector<web::NeighbourHazard> hazards;
+  for (std::size_t i = 0; i < region_->zones(); ++i) {
+    zones[region_->zone(i).id] = &region_->zone(i);
+  }
+  const RegionMap& map = region_->map();
+  std::deque<zone::Hazard> newest;
   zone::Walk<zone::HazardState> walk;
   walk.states = zone::StatesOnMap();
   walk.until = map.Sequence();
   for (bool is_last = false; !is_last;) {
-    const auto page = map.ReadHazards(walk, kMaxHazards);
+    auto page = map.ReadHazards(walk, kHazardsPerRead);
     walk.after = page.sequence;
     is_last = page.is_last;
-    for (const zone::Hazard& hazard : page.items) {
-      const auto origin = map.OriginOf(hazard.uuid);
-      if (!origin || IsOwn(hazard)) continue;
-      const RegionZone& zone = *zones.at(origin->zone);
-      hazards.push_back({hazard, map.WordsOf(hazard), zone.id,
-                         zone.name.empty() ? zone.id : zone.name, zone.url});
-      hazards.back().hazard.uuid = origin->hazard;
-    }
+    for (zone::Hazard& hazard : page.items) newest.push_back(std::move(hazard));
+    while (newest.size() > kMaxHazards) newest.pop_front();
   }
-  const std::size_t over = hazards.size() - std::min(hazards.size(), kMaxHazards);
-  hazards.erase(hazards.begin(), hazards.begin() + static_cast<std::ptrdiff_t>(over));
-  return hazards;
+  const protocol::DuplicateFilter own = OwnAround(newest);
+  for (const zone::Hazard& hazard : newest) {
+    const auto origin = map.OriginOf(hazard.uuid);
+    if (!origin || own.Find(hazard.class_name, hazard.position)) continue;
+    const RegionZone& zone = *zones.at(origin->zone);
+    list.push_back(
+        {hazard, map.WordsOf(hazard), zone.id, zone.name.empty() ? zone.id : zone.name, zone.url});
+    list.back().hazard.uuid = origin->hazard;
+  }
+  return list;
+}
+
+std::vector<web::NeighbourHazard> Neighbours::Hazards() const {
+  const MutexLock list_lock(list_mutex_);
+  const std::int64_t now_ns = SteadyNs();
+  if (!list_ns_ || now_ns - *list_ns_ >= Nanoseconds(kListAgeS)) {
+    const ReaderLock lock(mutex_);
+    list_ = Read();
+    list_ns_ = now_ns;
+  }
+  return list_;
 }
 
 std::vector<std::string> Neighbours::zones() const {
-  const std::shared_ptr<Region> region = this->region();
+  const ReaderLock lock(mutex_);
   std::vector<std::string> ids;
-  for (std::size_t i = 0; region && i < region->zones(); ++i) ids.push_back(region->zone(i).id);
+  for (std::size_t i = 0; region_ && i < region_->zones(); ++i) ids.push_back(region_->zone(i).id);
   return ids;
 }
 

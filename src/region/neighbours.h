@@ -1,12 +1,16 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/mutex.h"
 #include "directory/directory_file.h"
+#include "protocol/duplicate_filter.h"
 #include "protocol/hazard_catalogue.h"
 #include "region/region.h"
 #include "web/api/neighbour_api.h"
@@ -40,23 +44,25 @@ class Neighbours : public web::NeighbourReader {
 
   /// Keeps references to `zone` and `catalogue`. Follows nobody while the directory cannot be read,
   /// has expired or does not name the zone. `log` is called by any thread. Throws Error naming what
-  /// is not accepted.
+  /// is not accepted; that the last states cannot be kept now is told to `log`.
   Neighbours(Config config, const zone::ZoneService& zone,
              const protocol::HazardCatalogue& catalogue, Region::Clock now_ns, Region::Log log);
 
   /// Reads the directory's file if it has changed, and then follows the zones that it names now.
-  /// Called by one thread at a time. Throws Error when the last states cannot be kept.
+  /// Called by one thread at a time. Throws Error when the last states cannot be kept, and tries
+  /// again at the next call.
   void Renew();
 
+  /// As they were a second ago at most.
   std::vector<web::NeighbourHazard> Hazards() const override;
   /// Ids of the zones that are followed.
   std::vector<std::string> zones() const;
 
  private:
   std::vector<RegionZone> ZonesAround(const directory::ZoneDirectory& directory) const;
-  /// Whether this zone holds it, too.
-  bool IsOwn(const zone::Hazard& hazard) const;
-  std::shared_ptr<Region> region() const;
+  std::vector<web::NeighbourHazard> Read() const REQUIRES_SHARED(mutex_);
+  /// Those that drivers know and this zone holds, around `hazards`.
+  protocol::DuplicateFilter OwnAround(const std::deque<zone::Hazard>& hazards) const;
 
   const Config config_;
   const zone::ZoneService& zone_;
@@ -67,8 +73,13 @@ class Neighbours : public web::NeighbourReader {
   /// Whose zones are followed; null: there was none that is valid.
   std::shared_ptr<const directory::ZoneDirectory> directory_;
 
-  mutable Mutex mutex_;
-  std::shared_ptr<Region> region_ GUARDED_BY(mutex_);  ///< Null: nobody is followed.
+  mutable SharedMutex mutex_;
+  std::unique_ptr<Region> region_ GUARDED_BY(mutex_);  ///< Null: nobody is followed.
+
+  /// Makes the list; whoever asks meanwhile waits and has the same.
+  mutable Mutex list_mutex_ ACQUIRED_BEFORE(mutex_);
+  mutable std::vector<web::NeighbourHazard> list_ GUARDED_BY(list_mutex_);
+  mutable std::optional<std::int64_t> list_ns_ GUARDED_BY(list_mutex_);  ///< Steady.
 };
 
 }  // namespace livemap::region

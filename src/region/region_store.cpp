@@ -11,7 +11,8 @@ const std::vector<std::string>& RegionSchema() {
       "CREATE TABLE zones (zone TEXT PRIMARY KEY, log TEXT NOT NULL, sequence INTEGER NOT NULL, "
       "heard_ns INTEGER NOT NULL) WITHOUT ROWID;"
       "CREATE TABLE hazards (zone TEXT NOT NULL, uuid TEXT NOT NULL, feature TEXT NOT NULL, "
-      "PRIMARY KEY (zone, uuid)) WITHOUT ROWID;"};
+      "PRIMARY KEY (zone, uuid)) WITHOUT ROWID;",
+      "ALTER TABLE zones ADD COLUMN scope TEXT NOT NULL DEFAULT '';"};
   return kSteps;
 }
 
@@ -41,13 +42,15 @@ RegionStore::RegionStore(const std::string& path, const protocol::HazardCatalogu
 RegionStore::Kept RegionStore::Load(const std::string& zone, std::int64_t now_ns) const {
   const MutexLock lock(mutex_);
   Kept kept;
-  auto place = database_->Prepare("SELECT log, sequence, heard_ns FROM zones WHERE zone = ?");
+  auto place =
+      database_->Prepare("SELECT log, sequence, heard_ns, scope FROM zones WHERE zone = ?");
   place.Bind(1, zone);
   if (place.Step()) {
     const auto log = Uuid::Parse(place.Text(0));
     const std::int64_t sequence = place.Int(1);
     const std::int64_t heard_ns = place.Int(2);
-    if (log && sequence >= 0) kept.place = {*log, static_cast<std::uint64_t>(sequence), 0};
+    if (log && sequence >= 0)
+      kept.place = {*log, static_cast<std::uint64_t>(sequence), 0, place.Text(3)};
     // Nobody was heard in the future.
     if (heard_ns > 0 && heard_ns <= now_ns) kept.place.heard_ns = heard_ns;
   }
@@ -72,7 +75,7 @@ void RegionStore::Save(const std::string& zone, const LogPlace& place,
   const MutexLock lock(mutex_);
   auto put = database_->Prepare("INSERT OR REPLACE INTO hazards VALUES (?, ?, ?)");
   auto erase = database_->Prepare("DELETE FROM hazards WHERE zone = ? AND uuid = ?");
-  auto set = database_->Prepare("INSERT OR REPLACE INTO zones VALUES (?, ?, ?, ?)");
+  auto set = database_->Prepare("INSERT OR REPLACE INTO zones VALUES (?, ?, ?, ?, ?)");
   const auto forget = [&](const Uuid& uuid) {
     erase.Bind(1, zone).Bind(2, uuid.ToString()).Execute();
   };
@@ -87,7 +90,8 @@ void RegionStore::Save(const std::string& zone, const LogPlace& place,
     }
     for (const Uuid& uuid : gone) forget(uuid);
     set.Bind(1, zone).Bind(2, place.log.ToString());
-    set.Bind(3, static_cast<std::int64_t>(place.sequence)).Bind(4, place.heard_ns).Execute();
+    set.Bind(3, static_cast<std::int64_t>(place.sequence)).Bind(4, place.heard_ns);
+    set.Bind(5, place.scope).Execute();
   });
 }
 

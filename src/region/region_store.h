@@ -18,6 +18,8 @@ struct LogPlace {
   Uuid log;                    ///< Nil: the zone has not been read to its end yet.
   std::uint64_t sequence = 0;  ///< Everything up to here is known.
   std::int64_t heard_ns = 0;   ///< When the zone answered last, UTC ns since 1970; 0: never.
+  /// Names which places count: of what lies elsewhere nothing is known, also below `sequence`.
+  std::string scope = {};
 };
 
 /// The last state of each zone on disk, so that a region that starts shows a zone that is down as

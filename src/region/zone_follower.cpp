@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/sha256.h"
 #include "common/time.h"
 
 namespace livemap::region {
@@ -11,6 +12,39 @@ namespace {
 
 /// When a zone was heard is kept so often where nothing else is to be.
 constexpr double kKeepHeardS = 10;
+
+void AppendRings(const directory::ZoneArea& area, std::string& text) {
+  for (const auto& ring : area.rings()) {
+    text += '|';
+    for (const geo::GeoPoint& corner : ring) {
+      text +=
+          std::to_string(corner.latitude_deg) + ' ' + std::to_string(corner.longitude_deg) + ' ';
+    }
+  }
+}
+
+/// LogPlace::scope of the zone; empty where all places count.
+std::string ScopeOf(const RegionZone& zone) {
+  std::string text;
+  if (zone.area) AppendRings(*zone.area, text);
+  if (zone.only) {
+    text += "only " + std::to_string(zone.only->margin_m);
+    AppendRings(zone.only->area, text);
+  }
+  return text.empty() ? text : Sha256Hex(text).substr(0, 16);
+}
+
+/// What lies elsewhere has left, as far as this map is concerned: it may have been on it, and have
+/// moved. Returns how many did.
+std::size_t LetGoBeyond(const Surroundings& reach, std::vector<ToldHazard>& hazards) {
+  std::size_t count = 0;
+  for (ToldHazard& told : hazards) {
+    if (!told.IsThere() || reach.Have(told.hazard.position)) continue;
+    told.hazard.state = zone::HazardState::kGone;
+    ++count;
+  }
+  return count;
+}
 
 std::string TroubleOf(const orders::HttpAnswer& answer) {
   if (answer.status == 0) return "it does not answer: " + answer.error;
@@ -34,6 +68,10 @@ ZoneFollower::ZoneFollower(RegionZone zone, Call call, Clock now_ns, RegionMap& 
       store_(store) {
   RegionStore::Kept kept = store_.Load(zone_.id, now_ns_());
   place_ = kept.place;
+  const std::string scope = ScopeOf(zone_);
+  // What lies where nothing counted then is not known: the log is read anew.
+  if (place_.scope != scope) place_.log = Uuid{};
+  place_.scope = scope;
   saved_heard_ns_ = place_.heard_ns;
   KeepSurroundings(kept.hazards);
   map_.Apply(zone_.id, kept.hazards);
@@ -135,27 +173,16 @@ bool ZoneFollower::Take(ZoneAnswer answer, std::uint64_t after) {
 
 void ZoneFollower::LeaveOutBeyond(ZoneAnswer& answer) const {
   if (!zone_.area) return;
-  const auto is_beyond = [this](const ToldHazard& told) {
-    return told.IsThere() && (!zone_.area->IsNear(told.hazard.position, kMaxBeyondM) ||
-                              zone_.area->DepthM(told.hazard.position) < -kMaxBeyondM);
-  };
-  auto& hazards = answer.hazards;
-  const auto end = std::remove_if(hazards.begin(), hazards.end(), is_beyond);
-  if (end == hazards.end()) return;
-  answer.refused += static_cast<std::size_t>(hazards.end() - end);
+  const Surroundings reach{*zone_.area, kMaxBeyondM};
+  const std::size_t refused = LetGoBeyond(reach, answer.hazards);
+  if (refused == 0) return;
+  answer.refused += refused;
   answer.refusal = "a hazard lies more than " + std::to_string(static_cast<int>(kMaxBeyondM)) +
                    " m outside of the zone's area";
-  hazards.erase(end, hazards.end());
 }
 
-/// One that has moved out of what is wanted has left, as far as this map is concerned.
 void ZoneFollower::KeepSurroundings(std::vector<ToldHazard>& hazards) const {
-  if (!zone_.only) return;
-  for (ToldHazard& told : hazards) {
-    if (told.IsThere() && !zone_.only->Have(told.hazard.position)) {
-      told.hazard.state = zone::HazardState::kGone;
-    }
-  }
+  if (zone_.only) LetGoBeyond(*zone_.only, hazards);
 }
 
 void ZoneFollower::SayUp(const ZoneAnswer& answer) {

@@ -80,8 +80,9 @@ class NeighboursTest : public testing::Test {
     std::filesystem::last_write_time(path, std::filesystem::last_write_time(path) +
                                                std::chrono::seconds(static_cast<int>(version)));
   }
-  void Follow() {
+  void Follow(double margin_m = 500) {
     Neighbours::Config config;
+    config.margin_m = margin_m;
     config.zone = "north";
     config.directory = folder_.path() + "/zones.cms";
     config.authority = folder_.path() + "/ca.pem";
@@ -155,7 +156,7 @@ TEST_F(NeighboursTest, AfterTheOwnOneIsGoneTheOthersIsShown) {
   ASSERT_TRUE(ComeToBe(1));
   EXPECT_EQ(neighbours_->Hazards()[0].hazard.uuid, beside);
   ASSERT_TRUE(north_.zone->Close(own, "miller"));
-  EXPECT_THAT(neighbours_->Hazards(), SizeIs(2));
+  EXPECT_TRUE(ComeToBe(2));
 }
 
 TEST_F(NeighboursTest, OneThatMovesAwayFromTheBorderLeaves) {
@@ -196,7 +197,18 @@ TEST_F(NeighboursTest, ADirectoryThatComesLaterAndNewerOnesCount) {
   EXPECT_TRUE(ComeToBe(1));
   PutDirectory(3, "");
   neighbours_->Renew();
-  EXPECT_THAT(neighbours_->Hazards(), IsEmpty());
+  EXPECT_TRUE(ComeToBe(0));
+}
+
+TEST_F(NeighboursTest, WhatLaySomewhatFurtherIsThereWhenTheMarginGrows) {
+  PutDirectory(1, SouthUrl());
+  Add(south_, SouthOfBorder(200));
+  Add(south_, SouthOfBorder(900));
+  Follow();
+  ASSERT_TRUE(ComeToBe(1));
+  neighbours_.reset();
+  Follow(1000);
+  EXPECT_TRUE(ComeToBe(2));
 }
 
 TEST_F(NeighboursTest, AZoneServesThemToWhoMaySeeHazards) {
