@@ -96,6 +96,8 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
   cell_teller_ = std::make_unique<CellPublisher>(
       zone_, cells_, node.advertise<CellHazards>("hazard/cell_hazards", 20000));
   RestoreCells();
+  // Before anybody can decide or report: what is missed here no vehicle is told.
+  subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { OnEvent(event); });
   marker_publisher_ = node.advertise<visualization_msgs::MarkerArray>("hazard/markers", 1, true);
   if (!config_.work_orders.empty()) {
     orders_ = std::make_unique<orders::OrderDesk>(
@@ -112,7 +114,6 @@ ZoneNode::ZoneNode(ros::NodeHandle node, const ros::NodeHandle& private_node,
                                             orders_.get(), neighbours_.get());
     private_node.setParam("/livemap/web_port", web_->port());
   }
-  subscription_ = zone_.Subscribe([this](const zone::ZoneEvent& event) { OnEvent(event); });
   worker_ = std::thread([this] { WorkUntilClosed(); });
   updater_.setHardwareID("zone_cloudlet");
   updater_.add("zone", this, &ZoneNode::Diagnose);

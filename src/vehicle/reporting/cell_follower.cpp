@@ -78,8 +78,9 @@ void CellFollower::AskAgain(const std::string& zone) {
   const auto cells = zones_.find(zone);
   if (cells == zones_.end()) return;
   for (auto& [cell, asked] : cells->second) {
-    // What is not answered has been asked just now, or will be.
-    if (asked.is_answered) asked = Asked{};
+    // What is not answered has been asked just now, or will be. A zone that answers and wants to be
+    // asked in turns gets no more questions than one that does not answer.
+    if (asked.is_answered) asked = Asked{AnsweredS(asked) + config_.retry_s, 0, false, {}};
   }
 }
 
@@ -90,7 +91,9 @@ bool CellFollower::IsDue(Asked& asked, bool has_gap, double now_s) const {
     return false;
   }
   if (!asked.gap_s) asked.gap_s = now_s;
-  return asked.is_answered && now_s - *asked.gap_s >= config_.lag_s;
+  // A gap that the answer left open is not asked about at once.
+  return asked.is_answered && now_s - *asked.gap_s >= config_.lag_s &&
+         now_s - AnsweredS(asked) >= std::min(config_.retry_s, config_.refresh_s);
 }
 
 std::vector<protocol::CellRequest> CellFollower::TakeDue(double now_s,

@@ -84,6 +84,8 @@ class CellFollower {
   };
 
   bool IsDue(Asked& asked, bool has_gap, double now_s) const;
+  /// When the answer came, of one that is answered.
+  double AnsweredS(const Asked& asked) const { return *asked.due_s - config_.refresh_s; }
 
   const Config config_;
   std::vector<geo::MapCell> wanted_;

@@ -29,7 +29,7 @@ VehiclePoseLookup::Config ReporterPoseConfigOf(const HazardReporter::Config& con
 
 constexpr std::size_t kMaxWaitingNotices = 20000;
 /// Messages; what is dropped is asked again.
-constexpr std::size_t kMaxWaitingCellNews = 1000;
+constexpr std::size_t kMaxWaitingCellNews = 100;
 /// Sights from so many times too far away, or too uncertain, still help a hazard's place.
 constexpr double kSightReach = 3.0;
 /// Of fixes that stand in for fused poses: with the same limit more of what is passed at the start

@@ -547,12 +547,17 @@ void LocalHazardMap::Keep(Taking taking) {
   if (cells_.size() > kMaxCells) ForgetOldestCells();
 }
 
-/// A tenth of them, so that it is done seldom. The vehicle is told them anew when it comes near.
+/// Up to a tenth of them, so that it is done seldom. The vehicle is told them anew when it comes
+/// near. They are of the zone that has the most: the sequences of one say nothing of another's.
 void LocalHazardMap::ForgetOldestCells() {
-  std::vector<std::pair<std::uint64_t, CellKey>> oldest;
-  for (const auto& [key, chain] : cells_) oldest.emplace_back(chain.known(), key);
+  std::map<std::string, std::vector<std::pair<std::uint64_t, CellKey>>> by_zone;
+  for (const auto& [key, chain] : cells_) by_zone[key.first].emplace_back(chain.known(), key);
+  const auto most = std::max_element(
+      by_zone.begin(), by_zone.end(),
+      [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  auto& oldest = most->second;
   std::sort(oldest.begin(), oldest.end());
-  oldest.resize(kMaxCells / 10);
+  oldest.resize(std::min(oldest.size(), kMaxCells / 10));
   database_->Transaction([&] {
     for (const auto& [known, key] : oldest) {
       database_->Prepare("DELETE FROM cells WHERE zone=? AND cell=?")

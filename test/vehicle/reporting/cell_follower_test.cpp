@@ -112,11 +112,25 @@ TEST(CellFollowerTest, AsksWhereAnAnnouncementIsMissingAfterAMoment) {
   follower.SetHeard("west", {geo::MapCell::At(kTown)});
   follower.TakeDue(0, KnowsUpTo7);
   follower.NoteAnswer("west", geo::MapCell::At(kTown), 1);
-  EXPECT_TRUE(follower.TakeDue(2, HasGap).empty()) << "it may come yet";
-  EXPECT_TRUE(follower.TakeDue(2.5, KnowsUpTo7).empty()) << "it came";
-  EXPECT_TRUE(follower.TakeDue(3, HasGap).empty());
-  EXPECT_EQ(follower.TakeDue(4, HasGap).size(), 1U);
-  EXPECT_TRUE(follower.TakeDue(5.1, HasGap).empty()) << "the answer is on its way";
+  EXPECT_TRUE(follower.TakeDue(12, HasGap).empty()) << "it may come yet";
+  EXPECT_TRUE(follower.TakeDue(12.5, KnowsUpTo7).empty()) << "it came";
+  EXPECT_TRUE(follower.TakeDue(13, HasGap).empty());
+  EXPECT_EQ(follower.TakeDue(14, HasGap).size(), 1U);
+  EXPECT_TRUE(follower.TakeDue(15.1, HasGap).empty()) << "the answer is on its way";
+}
+
+TEST(CellFollowerTest, AGapThatTheAnswerLeavesOpenIsNotAskedAboutAtOnce) {
+  CellFollower follower({});
+  follower.SetHeard("west", {geo::MapCell::At(kTown)});
+  follower.TakeDue(0, HasGap);
+  std::size_t questions = 0;
+  for (double now_s = 0.5; now_s < 60; now_s += 0.5) {
+    follower.NoteAnswer("west", geo::MapCell::At(kTown), now_s);
+    for (double later_s = now_s; later_s < now_s + 4.9; later_s += 0.5) {
+      questions += follower.TakeDue(later_s, HasGap).size();
+    }
+  }
+  EXPECT_EQ(questions, 0U);
 }
 
 TEST(CellFollowerTest, AsksForAllAfterTheConnectionWasLost) {
@@ -144,7 +158,12 @@ TEST(CellFollowerTest, AsksAgainWhereTheZoneWantsIt) {
   follower.AskAgain("east");
   EXPECT_TRUE(follower.TakeDue(2, KnowsUpTo7).empty());
   follower.AskAgain("west");
-  EXPECT_EQ(follower.TakeDue(3, KnowsUpTo7).size(), 1U);
+  EXPECT_TRUE(follower.TakeDue(5.9, KnowsUpTo7).empty())
+      << "a zone cannot make it ask all the time";
+  EXPECT_EQ(follower.TakeDue(6, KnowsUpTo7).size(), 1U);
+  follower.NoteAnswer("west", cells.front(), 7);
+  follower.AskAgain("west");
+  EXPECT_EQ(follower.TakeDue(20, KnowsUpTo7).size(), 1U) << "long after the answer at once";
 }
 
 TEST(CellFollowerTest, EachZoneIsAskedForItself) {
