@@ -109,6 +109,8 @@ class ZoneCloudletTest(unittest.TestCase):
     def command(self, **parameters):
         values = {"directory": os.path.join(self.directory, "zone"), "web_port": 0,
                   "marker_period_s": 0.1, "diagnostics_period_s": 0.2, "join_gap_s": 600.0,
+                  # The vehicles here do not know of cells.
+                  "cell_wait_s": 0.0,
                   "catch_up_lag_s": 0.2, "catch_up_retry_s": 0.2, "catch_up_longest_retry_s": 0.4}
         values.update(parameters)
         return ([program("livemap", "zone_cloudlet"), "__name:=zone_cloudlet"] +
@@ -367,7 +369,7 @@ class ZoneCloudletTest(unittest.TestCase):
     def refusal(self, *arguments, **parameters):
         """Exit code and standard error of a node started with these parameters."""
         command = self.command(**parameters)
-        command[3] = "__name:=refused_zone"
+        command[1] = "__name:=refused_zone"
         done = subprocess.run(command + list(arguments), timeout=PATIENCE_S, text=True,
                               stderr=subprocess.PIPE, check=False)
         if rospy.has_param("/refused_zone"):
