@@ -47,7 +47,7 @@ class RegionStore {
             const std::vector<Uuid>& gone);
 
  private:
-  const protocol::HazardCatalogue& catalogue_;
+  const protocol::HazardCatalogue catalogue_;
   std::string damage_;
   mutable Mutex mutex_;
   mutable std::optional<SqliteDatabase> database_ GUARDED_BY(mutex_);

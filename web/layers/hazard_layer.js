@@ -19,7 +19,13 @@ function arcs(shares, count) {
 }
 
 function shortCount(count) {
-  return count < 10000 ? String(count) : `${Math.round(count / 1000)}k`;
+  return count < 10000 ? count.toLocaleString('en') : `${Math.round(count / 1000)}k`;
+}
+
+/** What a ring holds, in words that contain what it shows: who speaks to the browser says that. */
+function countInWords(count) {
+  const words = plural(count, 'hazard');
+  return words.startsWith(shortCount(count)) ? words : `${shortCount(count)}: ${words}`;
 }
 
 function lookOf(catalogue, content, row) {
@@ -47,8 +53,8 @@ function lookOf(catalogue, content, row) {
       const size = count < 10 ? 38 : count < 100 ? 44 : count < 1000 ? 50 : 58;
       const named = shares.map(([group, amount]) => [catalogue.group(group), amount]);
       const [most, amount] = named[0];
-      const name = named.length === 1 ? `${plural(count, 'hazard')}: ${most.label}`
-        : `${plural(count, 'hazard')}, ${amount.toLocaleString('en')} of them: ${most.label}`;
+      const name = named.length === 1 ? `${countInWords(count)}: ${most.label}`
+        : `${countInWords(count)}, ${amount.toLocaleString('en')} of them: ${most.label}`;
       return {
         name, className: 'cluster', iconSize: [size, size],
         build(node) {
