@@ -25,7 +25,7 @@ class Desktop(MapPage):
     def drawn(self):
         """How many hazards the signs stand for."""
         return self.browser.execute_script("""
-            const rings = [...document.querySelectorAll('#map .cluster')].map((ring) => Number(ring.textContent));
+            const rings = [...document.querySelectorAll('#map .cluster')].map((ring) => Number(ring.textContent.replace(',', '')));
             return document.querySelectorAll('#map .pin').length + rings.reduce((sum, count) => sum + count, 0);""")
 
     def assert_small(self):
