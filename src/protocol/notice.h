@@ -18,8 +18,7 @@ struct Notice {
   Action action = Action::kAdded;
   std::uint64_t sequence = 0;  ///< Of the zone's event log, strictly increasing.
   /// To everybody: of the announcement before, in `cell` where there is one; 0: there was none.
-  /// With kCaughtUp: where the telling
-  /// began, see HazardNotice.msg.
+  /// With kCaughtUp: where the telling began, see HazardNotice.msg.
   std::uint64_t previous_sequence = 0;
   /// To the vehicles of this cell alone; none: to everybody, or to the addressee.
   std::optional<geo::MapCell> cell;
