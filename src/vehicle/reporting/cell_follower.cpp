@@ -15,8 +15,9 @@ constexpr double kStepM = 100;
 }  // namespace
 
 CellFollower::CellFollower(const Config& config) : config_(config) {
-  for (const double number : {config.radius_m, config.hysteresis_m, config.refresh_s,
-                              config.retry_s, config.longest_retry_s, config.lag_s}) {
+  for (const double number :
+       {config.radius_m, config.hysteresis_m, config.refresh_s, config.retry_s,
+        config.longest_retry_s, config.rest_s, config.lag_s}) {
     if (std::isfinite(number) && number >= 0) continue;
     throw Error("a number of the cells that are followed is " + std::to_string(number) +
                 ", accepted is 0 or more");
@@ -78,9 +79,14 @@ void CellFollower::AskAgain(const std::string& zone) {
   const auto cells = zones_.find(zone);
   if (cells == zones_.end()) return;
   for (auto& [cell, asked] : cells->second) {
-    // What is not answered has been asked just now, or will be. A zone that answers and wants to be
-    // asked in turns gets no more questions than one that does not answer.
-    if (asked.is_answered) asked = Asked{AnsweredS(asked) + config_.retry_s, 0, false, {}};
+    // A zone that answers and wants to be asked in turns gets no more questions than one that does
+    // not answer. One that wants to be asked what it has been asked never got the question.
+    if (asked.is_answered) {
+      asked = Asked{AnsweredS(asked) + config_.rest_s, 0, false, {}};
+    } else if (asked.due_s) {
+      asked.due_s = *asked.due_s - asked.retry_s + std::min(asked.retry_s, config_.rest_s);
+      asked.retry_s = std::min(asked.retry_s, config_.rest_s);
+    }
   }
 }
 
@@ -93,7 +99,7 @@ bool CellFollower::IsDue(Asked& asked, bool has_gap, double now_s) const {
   if (!asked.gap_s) asked.gap_s = now_s;
   // A gap that the answer left open is not asked about at once.
   return asked.is_answered && now_s - *asked.gap_s >= config_.lag_s &&
-         now_s - AnsweredS(asked) >= std::min(config_.retry_s, config_.refresh_s);
+         now_s - AnsweredS(asked) >= std::min(config_.rest_s, config_.refresh_s);
 }
 
 std::vector<protocol::CellRequest> CellFollower::TakeDue(double now_s,

@@ -39,9 +39,12 @@ class CellFollower {
     double hysteresis_m = 300;
     std::size_t max_cells = 48;  ///< The nearest ones; at most protocol::kMaxRequestedCells.
     double refresh_s = 60;       ///< After an answer the vehicle asks again.
-    double retry_s = 5;          ///< Without an answer; doubled each time.
+    /// Without an answer; doubled each time. The connection loses none, so one is only late: asked
+    /// for again, it would come twice, which a zone with much to tell has no time for.
+    double retry_s = 20;
     double longest_retry_s = 60;
-    double lag_s = 1;  ///< Announcements that came ahead of others wait so long for these.
+    double rest_s = 5;  ///< From an answer to a question about what it left open.
+    double lag_s = 1;   ///< Announcements that came ahead of others wait so long for these.
   };
   /// What the vehicle knows of a cell.
   struct Knowledge {

@@ -93,7 +93,7 @@ TEST(CellFollowerTest, AsksAgainWhereNobodyAnswersAndLessAndLessOften) {
   for (double now_s = 0; now_s < 200; now_s += 1) {
     if (!follower.TakeDue(now_s, KnowsUpTo7).empty()) asked_s.push_back(now_s);
   }
-  EXPECT_EQ(asked_s, (std::vector<double>{0, 5, 15, 35, 75, 135, 195}));
+  EXPECT_EQ(asked_s, (std::vector<double>{0, 20, 60, 120, 180}));
   EXPECT_EQ(follower.unanswered(), 1U);
 }
 
@@ -153,7 +153,7 @@ TEST(CellFollowerTest, AsksAgainWhereTheZoneWantsIt) {
   follower.SetHeard("west", cells);
   EXPECT_EQ(follower.TakeDue(0, KnowsUpTo7).size(), 1U);
   follower.AskAgain("west");
-  EXPECT_TRUE(follower.TakeDue(1, KnowsUpTo7).empty()) << "it has just asked";
+  EXPECT_TRUE(follower.TakeDue(4.9, KnowsUpTo7).empty()) << "it has just asked";
   follower.NoteAnswer("west", cells.front(), 1);
   follower.AskAgain("east");
   EXPECT_TRUE(follower.TakeDue(2, KnowsUpTo7).empty());
@@ -164,6 +164,17 @@ TEST(CellFollowerTest, AsksAgainWhereTheZoneWantsIt) {
   follower.NoteAnswer("west", cells.front(), 7);
   follower.AskAgain("west");
   EXPECT_EQ(follower.TakeDue(20, KnowsUpTo7).size(), 1U) << "long after the answer at once";
+}
+
+TEST(CellFollowerTest, AZoneThatLostAQuestionIsAskedAgainSoonerThanOneThatIsSlow) {
+  CellFollower follower({});
+  follower.SetHeard("west", {geo::MapCell::At(kTown)});
+  EXPECT_EQ(follower.TakeDue(0, KnowsUpTo7).size(), 1U);
+  follower.AskAgain("west");
+  follower.AskAgain("west");
+  EXPECT_TRUE(follower.TakeDue(4.9, KnowsUpTo7).empty());
+  EXPECT_EQ(follower.TakeDue(5, KnowsUpTo7).size(), 1U);
+  EXPECT_TRUE(follower.TakeDue(14.9, KnowsUpTo7).empty()) << "nobody wants to be asked any more";
 }
 
 TEST(CellFollowerTest, EachZoneIsAskedForItself) {
