@@ -10,6 +10,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -68,12 +70,18 @@ class PostgresqlServer {
     }
     Fail("the server does not start, see " + folder_ + "/server.log");
   }
-  /// SIGKILL leaves it no time to finish anything; its own processes notice and die.
+  /// SIGKILL leaves it no time to finish anything. Returns when the processes that it had are gone,
+  /// too: until they notice, they go on to answer.
   void Kill(int signal) {
     if (process_ <= 0) return;
+    const std::vector<pid_t> children = Children(process_);
     ::kill(process_, signal);
     waitpid(process_, nullptr, 0);
     process_ = -1;
+    for (const pid_t child : children) {
+      for (int i = 0; i < 600 && IsRunning(child); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
   }
 
   std::string Url(const std::string& database) const {
@@ -93,6 +101,19 @@ class PostgresqlServer {
   }
 
  private:
+  static std::vector<pid_t> Children(pid_t process) {
+    const std::string id = std::to_string(process);
+    std::ifstream file("/proc/" + id + "/task/" + id + "/children");
+    return {std::istream_iterator<pid_t>(file), std::istream_iterator<pid_t>()};
+  }
+  /// False for one that ended and that nobody has waited for.
+  static bool IsRunning(pid_t process) {
+    std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+    std::string stat;
+    std::getline(file, stat);
+    const std::size_t name_end = stat.rfind(')');
+    return name_end != std::string::npos && stat.compare(name_end, 3, ") Z") != 0;
+  }
   static pid_t Spawn(const std::string& command) {
     const pid_t process = fork();
     if (process != 0) return process;
