@@ -76,11 +76,11 @@ std::size_t CityFleet::AddClient(const std::string& id, const std::string& zone_
   vehicle.id = id;
   vehicle.topics = "livemap/v1/" + config_.zone + "/vehicle/" + id + "/";
   vehicle.login_ns = SteadyNs();
-  std::vector<transport::MqttSubscription> subscriptions = {{vehicle.topics + "receipt", 1},
+  std::vector<transport::MqttSubscription> subscriptions = {{vehicle.topics + "receipt", 0},
                                                             {vehicle.topics + "notice", 1},
                                                             {vehicle.topics + "poll", 1},
                                                             {vehicle.topics + "cell_hazards", 1},
-                                                            {vehicle.topics + "change_receipt", 1}};
+                                                            {vehicle.topics + "change_receipt", 0}};
   if (!zone_notices.empty()) subscriptions.push_back({zone_notices, 1});
   vehicles_.push_back(std::move(vehicle));
   return loop_.Connect({id, PasswordOf(config_.credentials + "/" + id), subscriptions});

@@ -268,9 +268,11 @@ class MqttClient::Connection {
     return true;
   }
 
-  /// Keeps the library's own unbounded queue empty: at most max_inflight messages are with it.
+  /// Keeps the library's own unbounded queue empty: at most max_inflight messages are with it, and
+  /// none while the connection takes no more.
   void SendQueued() {
-    while (inflight_.size() < static_cast<std::size_t>(options_.max_inflight)) {
+    while (inflight_.size() < static_cast<std::size_t>(options_.max_inflight) &&
+           !mosquitto_want_write(handle_.get())) {
       std::optional<OutgoingMessage> message = queue_.Pop();
       if (!message) return;
       int id = 0;
