@@ -183,7 +183,8 @@ const VehicleStep& CityFleet::StepOf(std::size_t client) const {
   return movement_.At(client - first, second());
 }
 
-CityFleet::Result CityFleet::Drive(double warm_up_s, double seconds) {
+CityFleet::Result CityFleet::Drive(double warm_up_s, double seconds,
+                                   const std::function<void()>& on_measured) {
   const std::size_t count = movement_.config().vehicles;
   const std::size_t first = vehicles_.size() - count;
   start_ns_ = SteadyNs();
@@ -194,6 +195,7 @@ CityFleet::Result CityFleet::Drive(double warm_up_s, double seconds) {
   for (std::int64_t now_ns = start_ns_; now_ns < end_ns; now_ns = SteadyNs()) {
     if (!counting_ && now_ns >= measured_ns) {
       counting_ = true;
+      on_measured();
       for (std::size_t client = first; client < vehicles_.size(); ++client) {
         vehicles_[client].before = loop_.TrafficOf(client);
       }
@@ -442,6 +444,9 @@ const CityFleet::Announcement& CityFleet::Decode(const transport::MqttMessage& m
     added.report_ns = last_report_ns_[*added.hazard];
   }
   if (counting_) ++result_.announcements;
+  if (counting_ && added.report_ns != 0) {
+    result_.report_ns.emplace(added.notice.sequence, added.report_ns);
+  }
   if (announcements_.size() > kKeptAnnouncements) {
     if (announcements_.begin() != entry) announcements_.erase(announcements_.begin());
   }

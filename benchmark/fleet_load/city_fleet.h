@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <random>
@@ -35,7 +36,7 @@ namespace livemap::bench {
 ///     CityFleet fleet(config, std::move(movement));
 ///     if (is_new_city) fleet.Survey();
 ///     fleet.Connect();
-///     CityFleet::Result result = fleet.Drive(warm_up_s, seconds);
+///     CityFleet::Result result = fleet.Drive(warm_up_s, seconds, [] {});
 class CityFleet {
  public:
   struct Config {
@@ -68,7 +69,9 @@ class CityFleet {
     std::uint64_t poll_answers = 0;
     std::uint64_t announcements = 0;  ///< Different ones that a vehicle heard.
     std::vector<double> receipt_ms;   ///< From sending a report to its receipt.
-    /// From sending the report that an announcement tells of to each vehicle that hears it.
+    /// When the report was sent that an announcement tells of, by the announcement's sequence.
+    std::map<std::uint64_t, std::int64_t> report_ns;
+    /// From then to each vehicle that hears the announcement.
     std::vector<double> notice_ms;
     /// The same, of vehicles with the hazard ahead, at most kAheadM away.
     std::vector<double> ahead_ms;
@@ -96,8 +99,9 @@ class CityFleet {
   void Survey();
   /// Logs the vehicles in. Throws Error when not all could in time.
   void Connect();
-  /// Drives for `warm_up_s`, then for `seconds`, and measures the latter.
-  Result Drive(double warm_up_s, double seconds);
+  /// Drives for `warm_up_s`, then for `seconds`, and measures the latter, from when `on_measured`
+  /// is called.
+  Result Drive(double warm_up_s, double seconds, const std::function<void()>& on_measured);
 
  private:
   struct Waiting {

@@ -5,12 +5,14 @@
 #include <exception>
 #include <iostream>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "common/error.h"
 #include "evaluation/quantile.h"
 #include "fleet_load/city_fleet.h"
+#include "fleet_load/map_viewers.h"
 #include "tools/common/command_line.h"
 
 namespace livemap::bench {
@@ -35,8 +37,26 @@ double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
+/// What viewers heard of what the fleet reported.
+void PrintViewers(const MapViewers::Config& config, const MapViewers::Result& viewers,
+                  const CityFleet::Result& fleet) {
+  std::vector<double> heard_ms;
+  for (const MapViewers::Heard& heard : viewers.heard) {
+    const auto report = fleet.report_ns.find(heard.sequence);
+    if (report == fleet.report_ns.end()) continue;
+    heard_ms.push_back(static_cast<double>(heard.heard_ns - report->second) * 1e-6);
+  }
+  PrintCount("viewers", config.viewers);
+  PrintCount("slow_viewers", config.slow);
+  PrintCount("viewers_connected", viewers.connected);
+  PrintCount("viewers_lost", viewers.lost);
+  PrintCount("slow_viewers_closed", viewers.slow_closed);
+  PrintCount("viewer_events", viewers.heard.size());
+  PrintFleetQuantiles("viewer_ms", heard_ms);
+}
+
 void PrintFleetJson(std::size_t vehicles, const CityFleet::Result& result) {
-  std::printf("{\"vehicles\":%zu,\"seconds\":%.3f,\"connect_s\":%.2f,", vehicles, result.seconds,
+  std::printf("\"vehicles\":%zu,\"seconds\":%.3f,\"connect_s\":%.2f,", vehicles, result.seconds,
               result.connect_s);
   PrintCount("connected", result.connected);
   PrintCount("lost", result.lost);
@@ -94,6 +114,9 @@ int Run(int argc, char** argv) {
        {"surveyed", "", "the zone has them on its map, by an earlier run with the same --hazards"},
        {"births", "R", "new hazards per second, and as many that end (2)"},
        {"to-all", "", "vehicles hear of all hazards of the zone, not of the cells around them"},
+       {"web-port", "PORT", "the map's port on this machine, for viewers"},
+       {"viewers", "N", "clients of the map's live stream (0)"},
+       {"slow-viewers", "N", "of them, that hardly take what they are told (0)"},
        {"trace", "FILE", "how the vehicles move; without it they turn at random"},
        {"warm-up", "SECONDS", "driven before the measurement (20)"},
        {"seconds", "SECONDS", "measured (60)"}});
@@ -119,12 +142,27 @@ int Run(int argc, char** argv) {
   Movement::Config drive;
   drive.vehicles = static_cast<std::size_t>(line.Whole("vehicles", 100, 1, 30000));
   drive.seconds = static_cast<std::size_t>(warm_up_s + seconds) + 1;
+  MapViewers::Config crowd;
+  crowd.port = line.Whole("web-port", 8080, 1, 65535);
+  crowd.viewers = static_cast<std::size_t>(line.Whole("viewers", 0, 0, 20000));
+  crowd.slow = static_cast<std::size_t>(line.Whole("slow-viewers", 0, 0, 20000));
+  if (crowd.slow > crowd.viewers) {
+    throw Error("--slow-viewers is " + std::to_string(crowd.slow) +
+                ", accepted are 0 to --viewers");
+  }
   RaiseFileLimit();
   const std::string trace = line.Text("trace", "");
   CityFleet fleet(config, trace.empty() ? Movement(drive) : Movement(drive, trace));
   if (!line.Has("surveyed")) fleet.Survey();
   fleet.Connect();
-  PrintFleetJson(drive.vehicles, fleet.Drive(warm_up_s, seconds));
+  std::optional<MapViewers> viewers;
+  if (crowd.viewers > 0) viewers.emplace(crowd);
+  const CityFleet::Result result = fleet.Drive(warm_up_s, seconds, [&viewers] {
+    if (viewers) viewers->StartCounting();
+  });
+  std::printf("{");
+  if (viewers) PrintViewers(crowd, viewers->End(), result);
+  PrintFleetJson(drive.vehicles, result);
   return 0;
 }
 
