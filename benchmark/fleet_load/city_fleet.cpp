@@ -143,6 +143,7 @@ void CityFleet::Survey() {
         ++done[i];
         SendReport(first + i, hazard, stamps[i]);
       }
+      ResendReports(first + i);
     }
     loop_.Poll(20);
     if (SteadyNs() > deadline_ns) {
@@ -210,6 +211,7 @@ CityFleet::Result CityFleet::Drive(double warm_up_s, double seconds,
       ++due;
       if (counting_) result_.late_ms.push_back(MillisecondsSinceNs(due_ns));
       SendPosition(client, step);
+      ResendReports(client);
       LookAround(client, step);
       AnswerPolls(client, step);
     }
@@ -219,6 +221,7 @@ CityFleet::Result CityFleet::Drive(double warm_up_s, double seconds,
   result_.seconds = static_cast<double>(SteadyNs() - measured_ns) * 1e-9;
   result_.connected = loop_.connected() - first;
   for (std::size_t client = first; client < vehicles_.size(); ++client) {
+    result_.unanswered += vehicles_[client].reports.size();
     const ClientLoop::Traffic traffic = loop_.TrafficOf(client);
     if (traffic.received_bytes == 0) continue;
     const ClientLoop::Traffic& before = vehicles_[client].before;
@@ -353,10 +356,22 @@ void CityFleet::SendReport(std::size_t client, std::uint32_t hazard, std::int64_
   report.image_width = 640;
   report.image_height = 480;
   const std::int64_t now_ns = SteadyNs();
-  vehicle.reports[report.uuid] = {now_ns};
+  Waiting& waiting = vehicle.reports[report.uuid];
+  waiting = {now_ns, now_ns, Enclose(ros_io::ToMessage(report))};
   last_report_ns_[hazard] = now_ns;
-  loop_.Publish(client, vehicle.topics + "report", Enclose(ros_io::ToMessage(report)), 1);
+  loop_.Publish(client, vehicle.topics + "report", waiting.payload, 1);
   if (counting_) ++result_.reports;
+}
+
+void CityFleet::ResendReports(std::size_t client) {
+  Vehicle& vehicle = vehicles_[client];
+  const std::int64_t now_ns = SteadyNs();
+  for (auto& [uuid, waiting] : vehicle.reports) {
+    if (now_ns - waiting.sent_ns < kResendNs) continue;
+    waiting.sent_ns = now_ns;
+    loop_.Publish(client, vehicle.topics + "report", waiting.payload, 1);
+    if (counting_) ++result_.resent;
+  }
 }
 
 /// Of places that it is at.
@@ -415,7 +430,7 @@ void CityFleet::OnReceipt(std::size_t client, const transport::MqttMessage& mess
     const bool is_committed = receipt.status == protocol::Receipt::Status::kCommitted;
     ++(is_committed ? result_.committed : result_.refused);
     if (!is_committed && result_.first_refusal.empty()) result_.first_refusal = receipt.reason;
-    result_.receipt_ms.push_back(MillisecondsSinceNs(waiting->second.sent_ns));
+    result_.receipt_ms.push_back(MillisecondsSinceNs(waiting->second.first_sent_ns));
   }
   reports.erase(waiting);
 }

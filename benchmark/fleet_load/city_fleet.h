@@ -27,9 +27,9 @@ namespace livemap::bench {
 
 /// Vehicles that drive through a city, each an MQTT client with a login of its own, and speak the
 /// vehicle's messages with a zone: they say every second where they are and up to where they know
-/// the zone's map, report hazards that they pass and do not know, and answer polls. A few further
-/// logins, the surveyors, put the city's first hazards on the map before. Everything runs in one
-/// thread. Reports have no pictures.
+/// the zone's map, report hazards that they pass and do not know, again until they are answered,
+/// and answer polls. A few further logins, the surveyors, put the city's first hazards on the map
+/// before. Everything runs in one thread. Reports have no pictures.
 ///
 /// Typical usage:
 ///
@@ -54,13 +54,15 @@ class CityFleet {
   /// Counts and times of the measured seconds only, if not said otherwise.
   struct Result {
     double seconds = 0;
-    std::size_t connected = 0;    ///< Vehicles at the end.
-    std::uint64_t lost = 0;       ///< Connections, since the start.
-    std::string first_loss;       ///< Why.
-    double connect_s = 0;         ///< From the first login to the last subscription.
-    std::uint64_t positions = 0;  ///< Sent.
-    std::vector<double> late_ms;  ///< Each, after it was due: how busy this program is.
-    std::uint64_t reports = 0;    ///< Sent.
+    std::size_t connected = 0;     ///< Vehicles at the end.
+    std::uint64_t lost = 0;        ///< Connections, since the start.
+    std::string first_loss;        ///< Why.
+    double connect_s = 0;          ///< From the first login to the last subscription.
+    std::uint64_t positions = 0;   ///< Sent.
+    std::vector<double> late_ms;   ///< Each, after it was due: how busy this program is.
+    std::uint64_t reports = 0;     ///< Sent.
+    std::uint64_t resent = 0;      ///< Reports sent once more, without a receipt for kResendNs.
+    std::uint64_t unanswered = 0;  ///< Of all reports, at the end.
     std::uint64_t committed = 0;
     std::uint64_t refused = 0;
     std::string first_refusal;
@@ -90,6 +92,7 @@ class CityFleet {
   static constexpr double kAheadM = 500;
   static constexpr double kNearM = 1500;
   static constexpr std::size_t kSurveyors = 24;
+  static constexpr std::int64_t kResendNs = 10'000'000'000;
 
   /// Places the city's first hazards. `movement` has at least the seconds that are driven.
   CityFleet(const Config& config, Movement movement);
@@ -104,8 +107,11 @@ class CityFleet {
   Result Drive(double warm_up_s, double seconds, const std::function<void()>& on_measured);
 
  private:
+  /// A report in a vehicle's outbox.
   struct Waiting {
-    std::int64_t sent_ns = 0;
+    std::int64_t first_sent_ns = 0;
+    std::int64_t sent_ns = 0;  ///< The last time.
+    std::vector<std::uint8_t> payload;
   };
   struct Vehicle {
     std::string id;
@@ -143,6 +149,7 @@ class CityFleet {
   const Announcement& Decode(const transport::MqttMessage& message);
   void Learn(Vehicle& vehicle, const protocol::Notice& notice, std::optional<std::uint32_t> hazard);
   void SendReport(std::size_t client, std::uint32_t hazard, std::int64_t stamp_ns);
+  void ResendReports(std::size_t client);
   void SendPosition(std::size_t client, const VehicleStep& step);
   void AnswerPolls(std::size_t client, const VehicleStep& step);
   void LookAround(std::size_t client, const VehicleStep& step);

@@ -62,6 +62,8 @@ void PrintFleetJson(std::size_t vehicles, const CityFleet::Result& result) {
   PrintCount("lost", result.lost);
   PrintCount("positions", result.positions);
   PrintCount("reports", result.reports);
+  PrintCount("resent", result.resent);
+  PrintCount("unanswered", result.unanswered);
   PrintCount("committed", result.committed);
   PrintCount("refused", result.refused);
   PrintCount("births", result.births);
