@@ -2,8 +2,6 @@
 #include <sys/resource.h>
 
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -172,10 +170,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  try {
-    return livemap::bench::Run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "livemap_fleet_load: " << error.what() << "\n";
-    return 2;
-  }
+  return livemap::tools::RunProgram("livemap_fleet_load", argc, argv, livemap::bench::Run);
 }

@@ -1,6 +1,5 @@
 // Simulates weeks of a town's hazards and vehicles and prints what the zone made of them, as JSON.
 #include <cstdio>
-#include <exception>
 #include <map>
 
 #include "common/error.h"
@@ -97,10 +96,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  try {
-    return livemap::bench::Run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "livemap_measure_life: %s\n", error.what());
-    return 2;
-  }
+  return livemap::tools::RunProgram("livemap_measure_life", argc, argv, livemap::bench::Run);
 }

@@ -1,8 +1,6 @@
 // What ./livemap bench load measures with: a fleet's reports through a zone's broker.
 #include <algorithm>
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <string>
 
 #include "common/error.h"
@@ -78,10 +76,5 @@ int Run(int argc, char** argv) {
 }  // namespace livemap::bench
 
 int main(int argc, char** argv) {
-  try {
-    return livemap::bench::Run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "livemap_zone_load: " << error.what() << "\n";
-    return 2;
-  }
+  return livemap::tools::RunProgram("livemap_zone_load", argc, argv, livemap::bench::Run);
 }
