@@ -73,6 +73,7 @@ protocol::CellNews::Cell CellPublisher::Read(const protocol::CellRequest::Cell& 
     hazard.confidence = known->confidence;
     hazard.position = known->position;
     hazard.stamp_ns = known->updated_ns;
+    hazard.course_rad = known->course_rad;
     cell.hazards.push_back(std::move(hazard));
   }
   return cell;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,8 @@ struct CellNews {
     float confidence = 0;  ///< 0..1.
     geo::GeoPoint position;
     std::int64_t stamp_ns = 0;  ///< Of its last event, zone clock (UTC).
+    /// As Notice::course_rad.
+    double course_rad = std::numeric_limits<double>::quiet_NaN();
   };
   struct Cell {
     geo::MapCell cell;

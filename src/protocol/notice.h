@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,12 @@
 #include "geo/wgs84.h"
 
 namespace livemap::protocol {
+
+/// Whether a zone may tell it as the course of a vehicle that passed a hazard: -2 pi to 2 pi
+/// radians; NaN where the zone knows none.
+inline bool IsCourseOfPass(double course_rad) {
+  return std::isnan(course_rad) || std::abs(course_rad) <= 2 * M_PI;
+}
 
 /// The zone tells vehicles what changed on its map (HazardNotice.msg without ROS).
 struct Notice {
@@ -32,7 +40,9 @@ struct Notice {
   std::uint32_t sightings = 0;                              ///< Reports merged so far.
   std::int64_t first_seen_ns = 0;                           ///< Image stamp of the first report.
   std::int64_t last_seen_ns = 0;                            ///< Image stamp of the newest report.
-  double radius_m = 0;                                      ///< kCaughtUp: around `position`.
+  /// Of a vehicle that passed the hazard, clockwise from true north, as IsCourseOfPass accepts it.
+  double course_rad = std::numeric_limits<double>::quiet_NaN();
+  double radius_m = 0;              ///< kCaughtUp: around `position`.
   std::uint32_t told = 0;           ///< kCaughtUp: hazards told since the kCaughtUp before.
   std::string image_format;         ///< "jpeg", or empty when there is no picture.
   std::vector<std::uint8_t> image;  ///< Small annotated picture; may be empty.

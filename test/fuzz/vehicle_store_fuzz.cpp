@@ -51,6 +51,7 @@ protocol::Notice MakeNotice(std::uint8_t number) {
   notice.class_name = "deer";
   notice.confidence = 0.5F;
   notice.position = {40 + 0.1 * number, 8};
+  notice.course_rad = 0.5;
   return notice;
 }
 

@@ -31,9 +31,9 @@ def port_answers(port):
 
 # Of the definitions on the wire, which have no field `zone`.
 WIRE_MD5 = {
-    "livemap/CellHazards": "83fa272e40c3f88a9c695865cbe9209e",
+    "livemap/CellHazards": "ef3eb3b08eefca405332cf9c2d023276",
     "livemap/CellRequest": "eceb8c87685360e56aeb929ad7c324e1",
-    "livemap/HazardNotice": "88d23041ceb511154d96daa5ff718aef",
+    "livemap/HazardNotice": "635a641ecabd332c30bfc02d4414dff3",
     "livemap/HazardPoll": "78c6f168c0bc4ed892e7fbea24487d70",
     "livemap/HazardPollAnswer": "8f9e01f2a6d515909b89b0b9949f6e21",
     "livemap/HazardReport": "157e70184e3e48f3be020c650d2f788a",

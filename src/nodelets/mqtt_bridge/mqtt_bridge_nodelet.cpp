@@ -100,7 +100,8 @@ class MqttBridgePart : public NodeletPart {
           config(topic_config),
           mqtt_topic(topic_config.mqtt_topic),
           type(ros_io::MakeBridgedType(topic_config.type,
-                                       static_cast<std::size_t>(topic_config.max_bytes))) {}
+                                       static_cast<std::size_t>(topic_config.max_bytes),
+                                       topic_config.write_version)) {}
     const ros_io::BridgeTopic config;
     const transport::TopicTemplate mqtt_topic;
     const std::unique_ptr<ros_io::BridgedType> type;

@@ -41,6 +41,12 @@ struct HasPlace<Message, std::void_t<decltype(std::declval<Message&>().latitude)
                                      decltype(std::declval<Message&>().longitude)>>
     : std::true_type {};
 
+template <typename Message, typename = void>
+struct HasCourses : std::false_type {};
+template <typename Message>
+struct HasCourses<Message, std::void_t<decltype(std::declval<Message&>().courses)>>
+    : std::true_type {};
+
 /// Of a serialised text before its characters.
 constexpr std::size_t kTextLengthBytes = 4;
 
@@ -50,14 +56,30 @@ transport::Md5 RequireBridgedMd5(const std::string& name, const std::string& tex
   return *md5;
 }
 
+/// None for version 0, which is the present one.
+std::optional<EarlierDefinition> FindWritten(const std::string& name,
+                                             const std::vector<EarlierDefinition>& earlier,
+                                             int write_version) {
+  if (write_version == 0) return std::nullopt;
+  std::string accepted = "0 (the present one)";
+  for (const EarlierDefinition& definition : earlier) {
+    if (definition.version == write_version) return definition;
+    accepted += ", " + std::to_string(definition.version);
+  }
+  throw Error("message type '" + name + "' cannot be written as version " +
+              std::to_string(write_version) + ", accepted is " + accepted);
+}
+
 template <typename Message>
 class TypedBridge : public BridgedType {
  public:
   TypedBridge(std::size_t max_bytes, const std::string& md5_without_zone,
-              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier)
+              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier,
+              int write_version)
       : BridgedType(ros::message_traits::datatype<Message>(),
                     ros::message_traits::md5sum<Message>(), md5_without_zone,
-                    ros::message_traits::definition<Message>(), max_bytes, limits, earlier) {}
+                    ros::message_traits::definition<Message>(), max_bytes, limits, earlier,
+                    write_version) {}
 
   bool has_vehicle_id() const override { return HasVehicleId<Message>::value; }
   bool has_place() const override { return HasPlace<Message>::value; }
@@ -74,7 +96,8 @@ class TypedBridge : public BridgedType {
             const geo::GeoPoint place{message->latitude, message->longitude};
             if (geo::IsValid(place)) outgoing.cell = geo::MapCell::At(place).Quadkey();
           }
-          const std::vector<std::uint8_t> serialised = Serialise(*message);
+          const std::vector<std::uint8_t> serialised =
+              written() == nullptr ? Serialise(*message) : Serialise(AsEarlier(*message));
           outgoing.fault = Check({serialised.data(), serialised.size()});
           if (!outgoing.fault) outgoing.envelope = Enclose(serialised, outgoing.zone.size());
           send(std::move(outgoing));
@@ -88,6 +111,13 @@ class TypedBridge : public BridgedType {
   }
 
  private:
+  /// With nothing in the arrays that the earlier definition does not have.
+  Message AsEarlier(Message message) const {
+    message.schema_version = static_cast<std::uint16_t>(written()->version);
+    if constexpr (HasCourses<Message>::value) message.courses.clear();
+    return message;
+  }
+
   static std::vector<std::uint8_t> Serialise(const Message& message) {
     std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
     ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
@@ -110,38 +140,42 @@ class TypedBridge : public BridgedType {
   }
 };
 
-using Factory = std::function<std::unique_ptr<BridgedType>(std::size_t max_bytes)>;
+using Factory =
+    std::function<std::unique_ptr<BridgedType>(std::size_t max_bytes, int write_version)>;
 
 /// `bulk_fields` may fill a message to its own limit; all other strings and arrays are short.
 template <typename Message>
 std::pair<const std::string, Factory> BridgedTypeEntry(
     const std::string& md5_without_zone, const std::vector<std::string>& bulk_fields = {},
     const std::vector<EarlierDefinition>& earlier = {}) {
-  return {ros::message_traits::datatype<Message>(), [=](std::size_t max_bytes) {
+  return {ros::message_traits::datatype<Message>(), [=](std::size_t max_bytes, int write_version) {
             transport::LayoutLimits limits;
             for (const std::string& field : bulk_fields) limits.fields[field] = max_bytes;
             return std::make_unique<TypedBridge<Message>>(max_bytes, md5_without_zone, limits,
-                                                          earlier);
+                                                          earlier, write_version);
           }};
 }
 
 /// A new message type joins the bridge by one line here. Of reports and polls version 1 did not say
-/// what a picture shows, of positions version 2 not how old the outbox is.
+/// what a picture shows, of positions version 2 not how old the outbox is, and what a zone tells of
+/// hazards did not have their courses.
 const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
       BridgedTypeEntry<CandidateFrame>("", {"image.data"}),
-      BridgedTypeEntry<CellHazards>("83fa272e40c3f88a9c695865cbe9209e"),
+      BridgedTypeEntry<CellHazards>("ef3eb3b08eefca405332cf9c2d023276", {},
+                                    {{1, "83fa272e40c3f88a9c695865cbe9209e", 4}}),
       BridgedTypeEntry<CellRequest>("eceb8c87685360e56aeb929ad7c324e1"),
-      BridgedTypeEntry<HazardNotice>("88d23041ceb511154d96daa5ff718aef", {"image.data"}),
+      BridgedTypeEntry<HazardNotice>("635a641ecabd332c30bfc02d4414dff3", {"image.data"},
+                                     {{2, "88d23041ceb511154d96daa5ff718aef", 4}}),
       BridgedTypeEntry<HazardPoll>("78c6f168c0bc4ed892e7fbea24487d70", {},
-                                   {{"71097a76ee723564ac4d8188dc96c5b0", 1}}),
+                                   {{1, "71097a76ee723564ac4d8188dc96c5b0", 1}}),
       BridgedTypeEntry<HazardPollAnswer>("8f9e01f2a6d515909b89b0b9949f6e21", {"image.data"}),
       BridgedTypeEntry<HazardReport>("157e70184e3e48f3be020c650d2f788a", {"image.data"},
-                                     {{"6c9f383b83ba26551f53b42caa304fa7", 16}}),
+                                     {{1, "6c9f383b83ba26551f53b42caa304fa7", 16}}),
       BridgedTypeEntry<MapChange>("f0c59a6ee1ac17ed9fe4b38192a4afe1"),
       BridgedTypeEntry<ReportReceipt>("3bb0f7c51314b5a5e3dd08cca0268f28"),
       BridgedTypeEntry<VehiclePosition>("c1b41f81adbf946a004a6ca4f4769454", {},
-                                        {{"9146c7869de30f12ed97927d98d9681d", 4}}),
+                                        {{2, "9146c7869de30f12ed97927d98d9681d", 4}}),
   };
   return kRegistry;
 }
@@ -151,8 +185,9 @@ const std::map<std::string, Factory>& BridgedTypeRegistry() {
 BridgedType::BridgedType(std::string name, const std::string& md5,
                          const std::string& md5_without_zone, const std::string& definition,
                          std::size_t max_bytes, const transport::LayoutLimits& limits,
-                         const std::vector<EarlierDefinition>& earlier)
+                         const std::vector<EarlierDefinition>& earlier, int write_version)
     : name_(std::move(name)),
+      written_(FindWritten(name_, earlier, write_version)),
       wire_md5_(RequireBridgedMd5(name_, md5_without_zone.empty() ? md5 : md5_without_zone)),
       has_zone_(!md5_without_zone.empty()),
       max_bytes_(max_bytes),
@@ -179,9 +214,10 @@ std::optional<std::string> BridgedType::Check(transport::ByteView serialised) co
 
 std::vector<std::uint8_t> BridgedType::Enclose(const std::vector<std::uint8_t>& serialised,
                                                std::size_t zone_size) const {
-  const std::size_t left_out = has_zone_ ? kTextLengthBytes + zone_size : 0;
-  return transport::EncodeEnvelope(
-      {name_, wire_md5_, {serialised.data(), serialised.size() - left_out}});
+  const std::size_t left_out =
+      (has_zone_ ? kTextLengthBytes + zone_size : 0) + (written_ ? written_->added_bytes : 0);
+  const transport::Md5 md5 = written_ ? RequireBridgedMd5(name_, written_->md5) : wire_md5_;
+  return transport::EncodeEnvelope({name_, md5, {serialised.data(), serialised.size() - left_out}});
 }
 
 DecodedBridgeMessage BridgedType::Decode(transport::ByteView bytes) const {
@@ -228,9 +264,10 @@ std::vector<std::string> BridgedTypeNames() {
   return names;
 }
 
-std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes) {
+std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes,
+                                             int write_version) {
   const auto found = BridgedTypeRegistry().find(name);
-  if (found != BridgedTypeRegistry().end()) return found->second(max_bytes);
+  if (found != BridgedTypeRegistry().end()) return found->second(max_bytes, write_version);
   std::string accepted;
   for (const std::string& known : BridgedTypeNames()) {
     accepted += (accepted.empty() ? "" : ", ") + known;

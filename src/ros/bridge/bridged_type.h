@@ -29,8 +29,9 @@ struct OutgoingBridgeMessage {
 /// An older definition of a message that is still accepted: the present one without its last
 /// fields. Those are filled with zeros, `schema_version` stays the sender's.
 struct EarlierDefinition {
+  int version = 0;              ///< Its SCHEMA_VERSION.
   std::string md5;              ///< 32 hex digits, as ROS computes it.
-  std::size_t added_bytes = 0;  ///< That the fields added since take, all of them of fixed size.
+  std::size_t added_bytes = 0;  ///< That the fields added since take, where arrays are empty.
 };
 
 /// What a bridge writes into a message that comes in, whatever the message says itself.
@@ -80,10 +81,14 @@ class BridgedType {
 
  protected:
   /// `md5` is that of the definition. `md5_without_zone` is empty where that has no field `zone`;
-  /// the earlier ones have none.
+  /// the earlier ones have none. `write_version` is as for MakeBridgedType.
   BridgedType(std::string name, const std::string& md5, const std::string& md5_without_zone,
               const std::string& definition, std::size_t max_bytes,
-              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier);
+              const transport::LayoutLimits& limits, const std::vector<EarlierDefinition>& earlier,
+              int write_version);
+
+  /// The earlier definition by which messages are written; null: the present one.
+  const EarlierDefinition* written() const { return written_ ? &*written_ : nullptr; }
 
   std::optional<std::string> Check(transport::ByteView serialised) const;
   /// `zone_size` is the length of the text in the field `zone`, where there is one.
@@ -98,6 +103,7 @@ class BridgedType {
   std::optional<std::size_t> AddedSince(const transport::Md5& md5) const;
 
   std::string name_;
+  std::optional<EarlierDefinition> written_;
   transport::Md5 wire_md5_;
   bool has_zone_;
   std::vector<std::pair<transport::Md5, std::size_t>> known_;  // And what was added since, bytes.
@@ -109,7 +115,10 @@ class BridgedType {
 std::vector<std::string> BridgedTypeNames();
 
 /// The type called `name` ("livemap/HazardReport"), whose serialised messages may have up to
-/// `max_bytes` bytes. Throws Error listing the known names for any other.
-std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes);
+/// `max_bytes` bytes. Messages are written as their SCHEMA_VERSION `write_version` defines them,
+/// for receivers that know no newer one; 0: the present one. Throws Error listing the known names,
+/// or the versions that can be written, for any other.
+std::unique_ptr<BridgedType> MakeBridgedType(const std::string& name, std::size_t max_bytes,
+                                             int write_version = 0);
 
 }  // namespace livemap::ros_io

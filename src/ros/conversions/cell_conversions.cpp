@@ -96,6 +96,7 @@ CellHazards ToMessage(const protocol::CellNews& news) {
     message.cells.push_back(state);
     for (const protocol::CellNews::Hazard& hazard : cell.hazards) {
       message.hazards.push_back(ToCellMessage(hazard));
+      message.courses.push_back(static_cast<float>(hazard.course_rad));
     }
   }
   message.zone = news.zone;
@@ -104,10 +105,17 @@ CellHazards ToMessage(const protocol::CellNews& news) {
 
 protocol::CellNews FromMessage(const CellHazards& message) {
   constexpr char kName[] = "message of cells";
-  CheckVersion(message, kName);
+  constexpr std::uint16_t kWithoutCourses = 1;
+  CheckVersion(message, kName, kWithoutCourses);
   CheckCellCount(message.cells.size(), kName);
   protocol::CellNews news;
   news.vehicle_id = message.vehicle_id;
+  const std::size_t courses = message.courses.size();
+  if (courses != 0 && courses != message.hazards.size()) {
+    throw Error("message of cells has " + std::to_string(message.hazards.size()) + " hazards and " +
+                std::to_string(courses) +
+                " courses, accepted is one course for each hazard, or none at all");
+  }
   auto next = message.hazards.begin();
   for (const CellState& state : message.cells) {
     const auto left = static_cast<std::size_t>(message.hazards.end() - next);
@@ -119,7 +127,12 @@ protocol::CellNews FromMessage(const CellHazards& message) {
     protocol::CellNews::Cell cell{ToMapCell(state.cell, kName), state.since, state.sequence, {}};
     cell.hazards.reserve(state.hazards);
     for (std::uint32_t i = 0; i < state.hazards; ++i) {
-      cell.hazards.push_back(FromCellMessage(*next++));
+      cell.hazards.push_back(FromCellMessage(*next));
+      if (courses != 0) {
+        const auto number = static_cast<std::size_t>(next - message.hazards.begin());
+        cell.hazards.back().course_rad = static_cast<double>(message.courses[number]);
+      }
+      ++next;
     }
     news.cells.push_back(std::move(cell));
   }

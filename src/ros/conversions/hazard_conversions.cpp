@@ -132,6 +132,7 @@ protocol::Notice NoticeOf(const zone::Hazard& hazard) {
   notice.sightings = hazard.sightings;
   notice.first_seen_ns = hazard.first_seen_ns;
   notice.last_seen_ns = hazard.last_seen_ns;
+  notice.course_rad = hazard.course_rad;
   return notice;
 }
 
@@ -191,12 +192,14 @@ HazardNotice ToMessage(const protocol::Notice& notice) {
   message.image.header.stamp = message.last_seen;
   message.image.format = notice.image_format;
   message.image.data = notice.image;
+  message.course = static_cast<float>(notice.course_rad);
   message.zone = notice.zone;
   return message;
 }
 
 protocol::Notice FromMessage(const HazardNotice& message) {
-  CheckVersion(message, "hazard notice");
+  constexpr std::uint16_t kWithoutCourse = 2;
+  CheckVersion(message, "hazard notice", kWithoutCourse);
   protocol::Notice notice;
   switch (message.action) {
     case HazardNotice::ADDED:
@@ -231,6 +234,9 @@ protocol::Notice FromMessage(const HazardNotice& message) {
   notice.told = message.told;
   notice.image_format = message.image.format;
   notice.image = message.image.data;
+  if (message.schema_version > kWithoutCourse) {
+    notice.course_rad = static_cast<double>(message.course);
+  }
   notice.zone = message.zone;
   return notice;
 }

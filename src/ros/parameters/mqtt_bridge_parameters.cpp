@@ -98,6 +98,10 @@ BridgeTopic ReadBridgeTopic(const XmlRpc::XmlRpcValue& entry, const std::string&
   topic.keep_when_disconnected =
       reader.Flag("keep_when_disconnected", topic.keep_when_disconnected);
   topic.ros_queue = reader.Number("ros_queue", topic.ros_queue, 1, 100000);
+  topic.write_version = reader.Number("write_version", topic.write_version, 0, 65535);
+  if (topic.direction == BridgeDirection::kIn && topic.write_version != 0) {
+    reader.Refuse("write_version", "0 where the direction is in");
+  }
   reader.RejectUnknown();
   return topic;
 }
@@ -105,7 +109,8 @@ BridgeTopic ReadBridgeTopic(const XmlRpc::XmlRpcValue& entry, const std::string&
 /// What must hold so that no message can be attributed to the wrong vehicle.
 void CheckBridgeTopic(const BridgeTopic& topic, const BridgeConfig& config) {
   const transport::TopicTemplate mqtt_topic(topic.mqtt_topic);
-  const auto type = MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes));
+  const auto type =
+      MakeBridgedType(topic.type, static_cast<std::size_t>(topic.max_bytes), topic.write_version);
   const bool has_vehicle_id = type->has_vehicle_id();
   const std::string what = "topic '" + topic.name + "' of the bridge ";
   if (config.role == BridgeRole::kZone) {

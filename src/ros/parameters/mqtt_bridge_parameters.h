@@ -29,6 +29,8 @@ struct BridgeTopic {
   bool keep_when_disconnected =
       false;            ///< Out: wait in the queue (true) or drop and count (false).
   int ros_queue = 100;  ///< Messages.
+  /// Out: the SCHEMA_VERSION as which messages are written; 0: the present one.
+  int write_version = 0;
 };
 
 /// All that the mqtt_bridge nodelet is told; config/mqtt_bridge_*.yaml explain each value.

@@ -30,10 +30,15 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
       " ('known','gone','zones','cells')");
   if (!tables.Step() || tables.Int(0) != 4) return std::nullopt;
   tables.Reset();
+  SqliteStatement course =
+      database.Prepare("SELECT count(*) FROM pragma_table_info('known') WHERE name='course_rad'");
+  if (!course.Step() || course.Int(0) != 1) return std::nullopt;
+  course.Reset();
   StoredHazards stored;
   database.Transaction([&] {
     SqliteStatement rows = database.Prepare(
-        "SELECT id,class_name,latitude,longitude,sequence,substr(zone,1,64) FROM known"
+        "SELECT id,class_name,latitude,longitude,sequence,substr(zone,1,64),"
+        " course_rad,typeof(course_rad)='real' FROM known"
         " WHERE of_zone=1 AND sequence>0 AND typeof(id)='blob' AND length(id)=16");
     while (rows.Step()) {
       StoredHazards::Row row;
@@ -43,7 +48,10 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
       row.hazard.position = {rows.Real(2), rows.Real(3)};
       row.sequence = static_cast<std::uint64_t>(rows.Int(4));
       row.zone = rows.Text(5);
-      if (geo::IsValid(row.hazard.position)) stored.rows.push_back(row);
+      if (rows.Int(7) != 0) row.hazard.course_rad = rows.Real(6);
+      if (geo::IsValid(row.hazard.position) && protocol::IsCourseOfPass(row.hazard.course_rad)) {
+        stored.rows.push_back(row);
+      }
     }
     SqliteStatement newest = database.Prepare(
         "SELECT substr(zone,1,64),max(sequence) FROM"
@@ -82,7 +90,9 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
   const Word word{notice.zone, notice.sequence};
   const bool is_there = notice.action != Action::kRemoved;
-  if (!geo::IsValid(notice.position) || IsOld(notice.hazard_uuid, word, is_there)) return changes;
+  const bool is_valid =
+      geo::IsValid(notice.position) && (!is_there || protocol::IsCourseOfPass(notice.course_rad));
+  if (!is_valid || IsOld(notice.hazard_uuid, word, is_there)) return changes;
   if (!is_there) {
     if (gone_.size() >= kRemovedKept) gone_.clear();
     gone_[notice.hazard_uuid] = word;
@@ -96,7 +106,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   there_[notice.hazard_uuid] = word;
   gone_.erase(notice.hazard_uuid);
   duplicates_.Put({notice.hazard_uuid, notice.class_name, notice.position,
-                   SigmaOf(notice.covariance_m2), std::nullopt},
+                   SigmaOf(notice.covariance_m2), std::nullopt, notice.course_rad},
                   notice.zone, changes);
   return changes;
 }

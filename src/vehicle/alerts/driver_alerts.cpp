@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
+#include "protocol/notice.h"
 
 namespace livemap::vehicle {
 namespace {
@@ -50,7 +51,8 @@ bool DriverAlerts::Put(const AlertHazard& hazard) {
   const bool valid = !hazard.id.IsNil() && geo::IsValid(hazard.position) &&
                      std::isfinite(hazard.sigma_m) && hazard.sigma_m >= 0 &&
                      hazard.class_name.size() <= kMaxClassBytes &&
-                     (!hazard.altitude_m || std::isfinite(*hazard.altitude_m));
+                     (!hazard.altitude_m || std::isfinite(*hazard.altitude_m)) &&
+                     protocol::IsCourseOfPass(hazard.course_rad);
   if (!valid) {
     ++counters_.invalid_hazards;
     return false;
@@ -164,7 +166,8 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
   const Eigen::Vector2d place_m = frame_->ToEnu(known.hazard.position);
   WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
   if (!street_way_) return relation;
-  const StreetWay::Relation street = street_way_->RelationOf(place_m, sigma_m * sigma_m);
+  const StreetWay::Relation street =
+      street_way_->RelationOf(place_m, sigma_m * sigma_m);
   // The map may lack the vehicle's carriageway, but have the opposite one.
   const double others = (1 - relation.probability) * street.against / config_.way.others_per_m;
   const double by_course = street.unknown * relation.probability / (1 + others);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,8 @@ struct AlertHazard {
   geo::GeoPoint position;
   double sigma_m = 0;                ///< Of the position, per axis; 0: not known.
   std::optional<double> altitude_m;  ///< Above the ellipsoid, where known.
+  /// Of a vehicle that passed it, as protocol::Notice has it.
+  double course_rad = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Word to the driver about one hazard.
@@ -114,7 +117,8 @@ class DriverAlerts {
   DriverAlerts(const Config& config, const protocol::HazardCatalogue& catalogue,
                std::shared_ptr<const streets::StreetMap> map = nullptr);
 
-  /// Adds a hazard or replaces it. False when it is refused: no valid position, or too many.
+  /// Adds a hazard or replaces it. False when it is refused: no valid position or course, or too
+  /// many.
   bool Put(const AlertHazard& hazard);
   /// Takes a hazard away; cancels its alert, if one stands.
   std::vector<HazardAlert> Remove(const Uuid& id);

@@ -45,7 +45,9 @@ const std::vector<std::string>& LocalHazardMapMigrations() {
           kAddZoneOfReport,
       // Of cells of the map each counts for itself, too.
       "CREATE TABLE cells(zone TEXT NOT NULL, cell INTEGER NOT NULL, sequence INTEGER NOT NULL,"
-      "  PRIMARY KEY(zone, cell)) WITHOUT ROWID;"};
+      "  PRIMARY KEY(zone, cell)) WITHOUT ROWID;",
+      // NULL where it is not known.
+      "ALTER TABLE known ADD COLUMN course_rad REAL;"};
   return migrations;
 }
 
@@ -68,7 +70,7 @@ bool IsUsableNotice(const protocol::Notice& notice) {
   if (notice.action == protocol::Notice::Action::kRemoved) return true;
   return geo::IsValid(notice.position) && !notice.class_name.empty() &&
          notice.class_name.size() <= protocol::kMaxClassNameBytes && notice.confidence >= 0 &&
-         notice.confidence <= 1;
+         notice.confidence <= 1 && protocol::IsCourseOfPass(notice.course_rad);
 }
 
 }  // namespace
@@ -481,6 +483,7 @@ bool LocalHazardMap::TakeCell(const protocol::CellNews::Cell& cell, const std::s
     notice.confidence = hazard.confidence;
     notice.position = hazard.position;
     notice.stamp_ns = hazard.stamp_ns;
+    notice.course_rad = hazard.course_rad;
     const bool is_usable = hazard.sequence <= kMaxStoredSequence && IsUsableNotice(notice);
     const NoticeUse use =
         is_usable ? TakeHazard(notice, zone, taking.changes) : NoticeUse::kUnusable;
@@ -706,8 +709,8 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::stri
   }
   SqliteStatement upsert = database_->Prepare(
       "INSERT OR REPLACE INTO"
-      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone)"
-      " VALUES(?,1,?,?,?,?,?,?,?)");
+      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone,course_rad)"
+      " VALUES(?,1,?,?,?,?,?,?,?,?)");
   upsert.BindBlob(1, id.data(), id.size())
       .Bind(2, notice.class_name)
       .Bind(3, static_cast<double>(notice.confidence))
@@ -716,6 +719,7 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::stri
       .Bind(6, sequence)
       .Bind(7, notice.stamp_ns)
       .Bind(8, zone)
+      .Bind(9, notice.course_rad)  // SQLite takes NaN as NULL.
       .Execute();
 }
 

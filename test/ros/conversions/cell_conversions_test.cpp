@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -76,6 +77,32 @@ TEST(CellConversionsTest, HazardsStayWithTheirCells) {
   EXPECT_TRUE(back.cells[1].hazards.empty());
   ASSERT_EQ(back.cells[2].hazards.size(), 1U);
   EXPECT_EQ(back.cells[2].hazards[0].sequence, 102U);
+}
+
+TEST(CellConversionsTest, CoursesStayWithTheirHazards) {
+  protocol::CellNews news;
+  news.cells.push_back({kHere, 0, 20, {PotholeOfCell(1), PotholeOfCell(2)}});
+  news.cells.push_back({kThere, 0, 20, {PotholeOfCell(3)}});
+  news.cells[0].hazards[1].course_rad = 1.5;
+  news.cells[1].hazards[0].course_rad = -0.5;
+  CellHazards message = ToMessage(news);
+  const protocol::CellNews back = FromMessage(message);
+  EXPECT_TRUE(std::isnan(back.cells[0].hazards[0].course_rad));
+  EXPECT_DOUBLE_EQ(back.cells[0].hazards[1].course_rad, 1.5);
+  EXPECT_DOUBLE_EQ(back.cells[1].hazards[0].course_rad, -0.5);
+  message.courses.pop_back();
+  EXPECT_THROW(FromMessage(message), Error);
+  message.courses.resize(4);
+  EXPECT_THROW(FromMessage(message), Error);
+}
+
+TEST(CellConversionsTest, AZoneOfVersion1TellsNoCourses) {
+  protocol::CellNews news;
+  news.cells.push_back({kHere, 0, 20, {PotholeOfCell(1)}});
+  CellHazards message = ToMessage(news);
+  message.schema_version = 1;
+  message.courses.clear();
+  EXPECT_TRUE(std::isnan(FromMessage(message).cells[0].hazards[0].course_rad));
 }
 
 TEST(CellConversionsTest, HazardsThatBelongToNoCellOrAreMissingAreRefused) {

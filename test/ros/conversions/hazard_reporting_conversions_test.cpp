@@ -327,6 +327,21 @@ TEST(HazardConversions, OtherSchemaVersionsAreRefused) {
   EXPECT_THAT([&] { FromMessage(newer); }, ThrowsMessage<Error>(HasSubstr("version 4")));
 }
 
+TEST(HazardConversions, ANoticeTellsTheCourseThatTheZoneKnows) {
+  zone::HazardEvent event;
+  event.hazard.course_rad = 1.5;
+  EXPECT_DOUBLE_EQ(FromMessage(ToMessage(event)).course_rad, 1.5);
+  event.hazard.course_rad = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(FromMessage(ToMessage(event)).course_rad));
+}
+
+TEST(HazardConversions, ANoticeOfVersion2TellsNoCourse) {
+  HazardNotice message = ToMessage(protocol::Notice{});
+  message.schema_version = 2;
+  message.course = 0;  // As the bridge fills it in.
+  EXPECT_TRUE(std::isnan(FromMessage(message).course_rad));
+}
+
 TEST(HazardConversions, UnknownActionsAndStatesAreRefused) {
   HazardNotice notice = ToMessage(protocol::Notice{});
   notice.action = 4;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "test/support/temporary_directory.h"
@@ -54,6 +55,9 @@ TEST(AnnouncedHazardsTest, WhatCannotBeIsLeftOut) {
   notice.position.latitude_deg = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(hazards.Apply(notice).put.empty());
   notice = NoticeOf(0, Action::kAdded, 5);
+  EXPECT_TRUE(hazards.Apply(notice).put.empty());
+  notice = NoticeOf(1, Action::kAdded, 5);
+  notice.course_rad = 6.3;
   EXPECT_TRUE(hazards.Apply(notice).put.empty());
   notice = NoticeOf(2, Action::kAdded, 5);
   notice.covariance_m2.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -134,6 +138,50 @@ TEST(AnnouncedHazardsTest, WhatAZoneAnnouncesInAnothersAreaIsLeftOutAndCounted) 
   notice.action = Action::kRemoved;
   EXPECT_EQ(hazards.Apply(notice).gone.size(), 1U);
   EXPECT_EQ(hazards.beyond_zone(), 1U);
+}
+
+TEST(AnnouncedHazardsTest, TheCourseOfThePassComesByNoticeAndByTheLocalMap) {
+  const test::TemporaryDirectory directory;
+  LocalHazardMap::Config config;
+  config.path = directory.path() + "/map.sqlite3";
+  LocalHazardMap map(config, protocol::HazardCatalogue(), 0);
+  protocol::Notice notice = NoticeOf(1, Action::kAdded, 1);
+  notice.course_rad = 1.5;
+  protocol::Notice without = NoticeOf(2, Action::kAdded, 2);
+  without.position.latitude_deg += 0.01;
+  map.Apply(std::vector<protocol::Notice>{notice, without});
+  const auto stored = ReadStoredHazards(config.path);
+  ASSERT_TRUE(stored.has_value());
+  ASSERT_EQ(stored->rows.size(), 2U);
+  for (const StoredHazards::Row& row : stored->rows) {
+    if (row.hazard.id == IdOf(2)) {
+      EXPECT_TRUE(std::isnan(row.hazard.course_rad));
+    } else {
+      EXPECT_DOUBLE_EQ(row.hazard.course_rad, 1.5);
+    }
+  }
+  AnnouncedHazards hazards;
+  const auto changes = hazards.Apply(notice);
+  ASSERT_EQ(changes.put.size(), 1U);
+  EXPECT_DOUBLE_EQ(changes.put[0].course_rad, 1.5);
+}
+
+TEST(AnnouncedHazardsTest, ALocalMapFromBeforeItHadCoursesIsReadOnceItHasThem) {
+  const test::TemporaryDirectory directory;
+  LocalHazardMap::Config config;
+  config.path = directory.path() + "/map.sqlite3";
+  {
+    LocalHazardMap map(config, protocol::HazardCatalogue(), 0);
+    map.Apply(std::vector<protocol::Notice>{NoticeOf(1, Action::kAdded, 1)});
+  }
+  SqliteDatabase(config.path, true)
+      .Execute("ALTER TABLE known DROP COLUMN course_rad; PRAGMA user_version=5;");
+  EXPECT_FALSE(ReadStoredHazards(config.path).has_value());
+  const LocalHazardMap migrated(config, protocol::HazardCatalogue(), 0);
+  const auto stored = ReadStoredHazards(config.path);
+  ASSERT_TRUE(stored.has_value());
+  ASSERT_EQ(stored->rows.size(), 1U);
+  EXPECT_TRUE(std::isnan(stored->rows[0].hazard.course_rad));
 }
 
 TEST(AnnouncedHazardsTest, ReadsTheLocalMapWhileItIsOpen) {

@@ -254,6 +254,9 @@ TEST_F(DriverAlertsTest, RefusesHazardsAndPositionsThatCannotBe) {
   EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, -1, {}}));
   EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, 1, nan}));
   EXPECT_FALSE(alerts_.Put({Uuid(), "pothole", kHome, 1, {}}));
+  EXPECT_FALSE(alerts_.Put({AlertedId(1), "pothole", kHome, 1, {}, 6.3}));
+  EXPECT_FALSE(alerts_.Put(
+      {AlertedId(1), "pothole", kHome, 1, {}, -std::numeric_limits<double>::infinity()}));
   EXPECT_EQ(alerts_.size(), 0U);
   geo::TrackPose pose;
   pose.position = {nan, nan};

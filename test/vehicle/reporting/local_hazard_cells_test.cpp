@@ -186,6 +186,14 @@ TEST_F(LocalHazardCells, ACellOfWhichSomethingIsForgottenIsAskedAnew) {
   EXPECT_EQ(Sequence(), 0u);
 }
 
+TEST_F(LocalHazardCells, AHazardWhoseCourseCannotBeIsLeftOut) {
+  protocol::CellNews news = NewsOf(kStreet, 0, 5, {There(1, kStreet, 3), There(2, kStreet, 4)});
+  news.cells[0].hazards[0].course_rad = 7;
+  news.cells[0].hazards[1].course_rad = -3;
+  EXPECT_EQ(map_->Apply(news).unusable, 1U);
+  EXPECT_EQ(map_->known_count(), 1U);
+}
+
 TEST_F(LocalHazardCells, ImpossibleWordsOfCellsCountForNothing) {
   protocol::CellNews::Hazard nowhere = There(2, East(100), 5);
   nowhere.position.latitude_deg = std::nan("");
