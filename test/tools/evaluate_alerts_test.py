@@ -40,6 +40,23 @@ class EvaluateAlertsTest(unittest.TestCase):
         self.assertGreaterEqual(figures["early_share"], 0.9)
         self.assertEqual(figures["doubles"], 0)
 
+    def test_the_direction_in_which_hazards_are_passed_tells_a_bridges_from_those_below(self):
+        flags = "--drives 10 --scenario bridges --per-km 5 --streets true --wrong-course-share 0 --no-course-share "
+        told = self.figures(flags + "0")["with_streets"]
+        not_told = self.figures(flags + "1")["with_streets"]
+        self.assertEqual(told["on_way"], not_told["on_way"])
+        self.assertLess(told["missed"], not_told["missed"])
+        self.assertLess(told["false_alerts"], not_told["false_alerts"])
+
+    def test_what_the_zone_tells_of_no_hazard_can_be_told_wrongly_of_none(self):
+        flags = "--drives 2 --scenario bridges,crossings --streets true --no-course-share 1"
+        self.assertEqual(self.figures(flags), self.figures(flags + " --wrong-course-share 1 --course-noise-deg 90"))
+
+    def test_a_share_above_1_is_refused_by_name(self):
+        done = run("--no-course-share 1.1")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("no-course-share", done.stderr)
+
     def test_nothing_measured_is_null_with_a_reason(self):
         done = run("--json --drives 1 --scenario turns --per-km 0.001")
         self.assertEqual(done.returncode, 1)

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -95,8 +96,13 @@ class Pen {
   std::vector<double> curvatures_, headings_rad_, steps_m_;
 };
 
+/// How a lane is driven, seen in the order of its points.
+enum class Driven { kAlong, kAgainst };
+
 struct Lane {
   Line line;
+  Driven driven;
+  bool one_way;  // No vehicle comes the other way on the lane beside it.
   bool other_level = false;
 };
 
@@ -115,8 +121,12 @@ struct Streets {
   std::vector<TrafficStreet> mapped;         // What a map has: middles of carriageways.
   std::vector<Eigen::Vector2d> junctions_m;  // Where those meet.
 
-  void AddLane(Line line, bool other_level = false) {
-    lanes.push_back({std::move(line), other_level});
+  /// Of a street that is driven in both directions.
+  void AddLane(Line line, Driven driven, bool other_level = false) {
+    lanes.push_back({std::move(line), driven, false, other_level});
+  }
+  void AddOneWayLane(Line line, Driven driven) {
+    lanes.push_back({std::move(line), driven, true, false});
   }
 };
 
@@ -136,8 +146,8 @@ void GoOn(Streets& streets, SeededRandom& random, double length_m) {
 }
 
 void AddOwnLanes(Streets& streets) {
-  streets.AddLane(streets.way.line());
-  streets.AddLane(streets.way.Beside(kLaneM));
+  streets.AddLane(streets.way.line(), Driven::kAlong);
+  streets.AddLane(streets.way.Beside(kLaneM), Driven::kAgainst);
 }
 
 /// The own street as one of the map, too.
@@ -153,8 +163,8 @@ void AddAcross(Streets& streets, double angle_rad, double half_m, bool other_lev
   const Eigen::Vector2d middle_m = streets.way.place_m() + 0.5 * kLaneM * streets.way.Left();
   Pen pen(middle_m - half_m * along, heading_rad);
   pen.Straight(2 * half_m);
-  streets.AddLane(pen.Beside(0.5 * kLaneM), other_level);
-  streets.AddLane(pen.Beside(-0.5 * kLaneM), other_level);
+  streets.AddLane(pen.Beside(0.5 * kLaneM), Driven::kAgainst, other_level);
+  streets.AddLane(pen.Beside(-0.5 * kLaneM), Driven::kAlong, other_level);
   TrafficStreet across{pen.line()};
   across.bridge = other_level;
   streets.mapped.push_back(std::move(across));
@@ -165,9 +175,10 @@ Streets MakeParallelStreets(SeededRandom& random) {
   Streets streets;
   GoOn(streets, random, 6000);
   AddOwnStreet(streets);
-  for (const double aside_m : {15.0, 15.0 + kLaneM, -15.0, -15.0 - kLaneM}) {
-    streets.AddLane(streets.way.Beside(aside_m));
-  }
+  streets.AddLane(streets.way.Beside(15), Driven::kAlong);
+  streets.AddLane(streets.way.Beside(15 + kLaneM), Driven::kAgainst);
+  streets.AddLane(streets.way.Beside(-15), Driven::kAgainst);
+  streets.AddLane(streets.way.Beside(-15 - kLaneM), Driven::kAlong);
   for (const double middle_m : {15.0 + 0.5 * kLaneM, -15.0 - 0.5 * kLaneM}) {
     streets.mapped.push_back({streets.way.Beside(middle_m)});
   }
@@ -181,10 +192,12 @@ Streets MakeOppositeCarriageways(SeededRandom& random) {
     streets.way.Straight(Between(random, 100, 1500));
     streets.way.Bend(Between(random, -40, 40) * kDegree, Between(random, 500, 1500));
   }
-  AddOwnStreet(streets);
+  streets.AddOneWayLane(streets.way.line(), Driven::kAlong);
+  streets.AddOneWayLane(streets.way.Beside(kLaneM), Driven::kAlong);
+  streets.mapped.push_back({streets.way.Beside(0.5 * kLaneM)});
   const double median_m = Between(random, 9, 16);
-  streets.AddLane(streets.way.Beside(median_m + kLaneM));
-  streets.AddLane(streets.way.Beside(median_m + 2 * kLaneM));
+  streets.AddOneWayLane(streets.way.Beside(median_m + kLaneM), Driven::kAgainst);
+  streets.AddOneWayLane(streets.way.Beside(median_m + 2 * kLaneM), Driven::kAgainst);
   Line opposite = streets.way.Beside(median_m + 1.5 * kLaneM);
   std::reverse(opposite.begin(), opposite.end());
   streets.mapped.back().one_way = true;
@@ -321,8 +334,8 @@ Streets MakeRoundabouts(SeededRandom& random) {
       const Eigen::Vector2d gate_m = MapExit(streets, exits_m[arm], pen, BeginOfExit(pen));
       const std::size_t from = pen.size();
       pen.Straight(200);
-      streets.AddLane(PartOf(pen.line(), from, pen.size()));
-      streets.AddLane(pen.Beside(kLaneM, from));
+      streets.AddLane(PartOf(pen.line(), from, pen.size()), Driven::kAlong);
+      streets.AddLane(pen.Beside(kLaneM, from), Driven::kAgainst);
       streets.mapped.push_back({MiddleSince(pen, from, {gate_m})});
     }
     DriveRoundabout(streets.way, kRoundaboutArmsRad[taken], ring_m);
@@ -367,8 +380,8 @@ Streets MakeTurns(SeededRandom& random) {
       TurnAtJunction(pen, turns_rad[turn]);
       const std::size_t from = pen.size();
       pen.Straight(200);
-      streets.AddLane(pen.line());
-      streets.AddLane(pen.Beside(kLaneM));
+      streets.AddLane(pen.line(), Driven::kAlong);
+      streets.AddLane(pen.Beside(kLaneM), Driven::kAgainst);
       streets.mapped.push_back({MiddleSince(pen, from, {middle_m})});
     }
     TurnAtJunction(streets.way, turns_rad[taken]);
@@ -470,8 +483,34 @@ std::vector<TrafficMoment> DriveAlong(const Streets& streets, SeededRandom& rand
   return moments;
 }
 
+double CourseAlong(const Eigen::Vector2d& ahead) { return std::atan2(ahead.x(), ahead.y()); }
+
+/// The course of a vehicle on the lane, driven along or against its points, that is `before_m` from
+/// the place at point `at`; at the lane's end where the lane is not so long.
+double CourseBefore(const Line& line, std::size_t at, Driven driven, double before_m) {
+  const auto before = static_cast<std::size_t>(std::lround(before_m));
+  const std::size_t last = line.size() - 1;
+  if (driven == Driven::kAlong) {
+    const std::size_t seen_from = std::max<std::size_t>(1, at > before ? at - before : 1);
+    return CourseAlong(line[seen_from] - line[seen_from - 1]);
+  }
+  const std::size_t seen_from = std::min(last - 1, at + before);
+  return CourseAlong(line[seen_from] - line[seen_from + 1]);
+}
+
+/// How vehicles that see the hazards drive.
+void AddCourses(const Lane& lane, std::size_t at, TrafficHazard& hazard, SeededRandom& random) {
+  constexpr double kSeenFromLeastM = 8;
+  constexpr double kSeenFromMostM = 25;
+  const double before_m = Between(random, kSeenFromLeastM, kSeenFromMostM);
+  const Driven oncoming = lane.driven == Driven::kAlong ? Driven::kAgainst : Driven::kAlong;
+  hazard.course_rad = CourseBefore(lane.line, at, lane.driven, before_m);
+  hazard.oncoming_course_rad = lane.one_way ? std::numeric_limits<double>::quiet_NaN()
+                                            : CourseBefore(lane.line, at, oncoming, before_m);
+}
+
 std::vector<TrafficHazard> ScatterHazards(const Streets& streets, double per_km,
-                                          SeededRandom& random) {
+                                          SeededRandom& random, SeededRandom& sights) {
   constexpr double kAsideM = 0.4;
   const std::array<const char*, 3> classes{"pothole", "traffic_cone", "debris"};
   std::vector<TrafficHazard> hazards;
@@ -484,6 +523,7 @@ std::vector<TrafficHazard> ScatterHazards(const Streets& streets, double per_km,
         const auto chosen = static_cast<std::size_t>(3 * random.Uniform());
         hazards.push_back(
             {lane.line[i] + kAsideM * random.Normal(), lane.other_level, classes.at(chosen)});
+        AddCourses(lane, i, hazards.back(), sights);
         next_m += random.Exponential(1000 / per_km);
       }
     }
@@ -513,7 +553,8 @@ TrafficDrive MakeTrafficDrive(const std::string& scenario, double per_km, std::u
   TrafficDrive drive;
   drive.way_m = streets.way.line();
   drive.moments = DriveAlong(streets, random);
-  drive.hazards = ScatterHazards(streets, per_km, random);
+  SeededRandom sights(seed * 1000003 + number + 1000);  // So that all else stays as it was.
+  drive.hazards = ScatterHazards(streets, per_km, random, sights);
   drive.streets = streets.mapped;
   drive.junctions_m = streets.junctions_m;
   return drive;

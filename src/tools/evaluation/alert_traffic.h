@@ -14,6 +14,11 @@ struct TrafficHazard {
   Eigen::Vector2d place_m;   ///< East, north.
   bool other_level = false;  ///< On a bridge above the vehicle's way.
   std::string class_name;
+  /// Course of a vehicle on the hazard's lane that sees it, clockwise from north: 8 to 25 m before
+  /// it, perhaps before a bend or a turn.
+  double course_rad = 0;
+  /// The same on the oncoming lane; NaN where the street is driven in one direction.
+  double oncoming_course_rad = 0;
 };
 
 /// Where the vehicle truly is at one moment.

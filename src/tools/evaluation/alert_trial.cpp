@@ -50,6 +50,32 @@ std::size_t IndexOfHazard(const Uuid& id) {
   return index;
 }
 
+/// The direction in which a hazard is passed, as the zone tells it; NaN where it knows none. The
+/// same random numbers are drawn whatever the errors are.
+double ToldCourse(const TrafficDrive& drive, const TrafficHazard& hazard,
+                  const CourseErrors& errors, datasets::SeededRandom& random) {
+  const bool is_none = random.Uniform() < errors.none_share;
+  const double wrong_draw = random.Uniform();
+  const bool is_oncoming = random.Uniform() < errors.oncoming_share;
+  const double any_rad = 2 * M_PI * random.Uniform();
+  const double noise_rad = errors.sigma_deg * M_PI / 180 * random.Normal().x();
+  if (is_none) return std::numeric_limits<double>::quiet_NaN();
+  const bool is_at_junction = std::any_of(
+      drive.junctions_m.begin(), drive.junctions_m.end(), [&](const Eigen::Vector2d& junction_m) {
+        return (junction_m - hazard.place_m).norm() < kAtJunctionM;
+      });
+  double course_rad = hazard.course_rad;
+  if (is_oncoming && std::isfinite(hazard.oncoming_course_rad)) {
+    course_rad = hazard.oncoming_course_rad;
+  }
+  if (is_at_junction && wrong_draw < errors.wrong_share) {
+    course_rad += any_rad < M_PI ? M_PI / 2 : -M_PI / 2;
+  } else if (!is_at_junction && wrong_draw < 0.1 * errors.wrong_share) {
+    course_rad = any_rad;
+  }
+  return std::remainder(course_rad + noise_rad, 2 * M_PI);
+}
+
 /// What the driver is told on a drive.
 class AlertRun {
  public:
@@ -60,11 +86,13 @@ class AlertRun {
         frame_({kDatumLatitude, kDatumLongitude}),
         alerts_(config, catalogue, MapOf(drive, trial)) {
     datasets::SeededRandom random(trial.seed * 7919 + 1);
+    datasets::SeededRandom courses(trial.seed * 7919 + 5);
     for (std::size_t i = 0; i < drive.hazards.size(); ++i) {
       const Eigen::Vector2d told_m =
           drive.hazards[i].place_m + trial.place_sigma_m * random.Normal();
       alerts_.Put({IdOfHazard(i), drive.hazards[i].class_name, frame_.ToGeo(told_m),
-                   trial.place_sigma_m, std::nullopt});
+                   trial.place_sigma_m, std::nullopt,
+                   ToldCourse(drive, drive.hazards[i], trial.course_errors, courses)});
     }
   }
 

@@ -14,6 +14,19 @@
 
 namespace livemap::tools {
 
+/// What the zone tells wrongly, or not at all, of the directions in which hazards are passed.
+struct CourseErrors {
+  double sigma_deg = 5;      ///< Of a course, standard deviation.
+  double none_share = 0.15;  ///< Of the hazards: the zone knows no direction.
+  /// Of those within kAtJunctionM of a junction: a vehicle of the crossing street has reported it.
+  /// Of the others a tenth of this share, in any direction.
+  double wrong_share = 0.2;
+  /// Of those on streets that are driven in both directions: a vehicle on the oncoming lane has.
+  double oncoming_share = 0.2;
+};
+
+constexpr double kAtJunctionM = 20;
+
 /// What the vehicle is given of the simulated world.
 struct AlertTrial {
   /// Of the receiver: white and slow errors, losses of the fix.
@@ -26,6 +39,7 @@ struct AlertTrial {
   std::uint64_t seed = 1;
   bool streets = false;  ///< The vehicle has a map of the streets, with these errors.
   StreetMapErrors map_errors;
+  CourseErrors course_errors;
 };
 
 /// docs/reference/measures.md defines the figures.

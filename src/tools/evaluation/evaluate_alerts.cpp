@@ -98,6 +98,17 @@ int EvaluateAlerts(int argc, char** argv) {
         "m/s, default 0.15; 0: it measures none"},
        {"place-sigma-m", "X", "of the hazards on the zone's map, the same, m, default 1"},
        {"absent", "X", "share of the streets that the map does not have, default 0.02"},
+       {"course-noise-deg", "X",
+        "of the direction in which a hazard is passed, as the zone tells it, standard deviation,\n"
+        "degrees, default 5"},
+       {"no-course-share", "X",
+        "share of the hazards of which the zone tells no direction, default 0.15; 1: of all"},
+       {"wrong-course-share", "X",
+        "share of the hazards within 20 m of a junction that a vehicle of the crossing street has\n"
+        "reported, default 0.2; elsewhere a tenth of it have any direction"},
+       {"oncoming-share", "X",
+        "share of the hazards on streets driven in both directions that a vehicle on the oncoming\n"
+        "lane has reported, default 0.2"},
        {"hazards", "FILE", "catalogue of hazard classes; default: every class has rank 2"}});
   if (!line.Parse(argc, argv)) return 0;
   const std::vector<std::string> scenarios = ChosenScenarios(line.Text("scenario", ""));
@@ -112,6 +123,11 @@ int EvaluateAlerts(int argc, char** argv) {
   trial.velocity_sigma_mps = line.Number("velocity-noise-mps", trial.velocity_sigma_mps, 0, 100);
   trial.place_sigma_m = line.Number("place-sigma-m", trial.place_sigma_m, 0, 100);
   trial.map_errors.absent_share = line.Number("absent", trial.map_errors.absent_share, 0, 1);
+  CourseErrors& courses = trial.course_errors;
+  courses.sigma_deg = line.Number("course-noise-deg", courses.sigma_deg, 0, 180);
+  courses.none_share = line.Number("no-course-share", courses.none_share, 0, 1);
+  courses.wrong_share = line.Number("wrong-course-share", courses.wrong_share, 0, 1);
+  courses.oncoming_share = line.Number("oncoming-share", courses.oncoming_share, 0, 1);
   const std::string hazards = line.Text("hazards", "");
   const protocol::HazardCatalogue catalogue =
       hazards.empty() ? protocol::HazardCatalogue() : protocol::HazardCatalogue::Load(hazards);

@@ -167,7 +167,7 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
   WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
   if (!street_way_) return relation;
   const StreetWay::Relation street =
-      street_way_->RelationOf(place_m, sigma_m * sigma_m);
+      street_way_->RelationOf(place_m, sigma_m * sigma_m, known.hazard.course_rad);
   // The map may lack the vehicle's carriageway, but have the opposite one.
   const double others = (1 - relation.probability) * street.against / config_.way.others_per_m;
   const double by_course = street.unknown * relation.probability / (1 + others);

@@ -143,8 +143,10 @@ void StreetWay::LookAhead(const geo::LocalFrame& frame, const CourseFilter& filt
     const double cosine =
         (street.forward ? 1 : -1) * course.dot((to_m - from_m).stableNormalized());
     const bool against = driving.course_known && street.one_way() && cosine < kAgainstCosine;
-    others_.push_back(
-        {from_m, to_m, street.HalfWidthM(), street.layer, ways.Touches(segment), against});
+    // A one-way street begins where it is driven from.
+    const bool turned = street.one_way() && street.backward;
+    others_.push_back({turned ? to_m : from_m, turned ? from_m : to_m, street.HalfWidthM(),
+                       street.layer, ways.Touches(segment), against, street.one_way()});
   }
 }
 
@@ -169,15 +171,36 @@ double StreetWay::Density(double off_m, double half_width_m, double variance_m2)
          (2 * half_width_m);
 }
 
+/// Of the course of who passed a place that lies on a street along a vector, against courses that
+/// are spread evenly. 1 where it is not known.
+double StreetWay::PassedDensity(const Eigen::Vector2d& along, bool one_way,
+                                double passed_rad) const {
+  if (!std::isfinite(passed_rad)) return 1;
+  const double sigma_rad = config_.passed_sigma_rad;
+  const double peak = std::sqrt(2 * M_PI) / sigma_rad;
+  const auto density = [&](double off_rad) {
+    const double sigmas = std::remainder(off_rad, 2 * M_PI) / sigma_rad;
+    return peak * std::exp(-0.5 * sigmas * sigmas);
+  };
+  const double off_rad = passed_rad - std::atan2(along.x(), along.y());
+  // In which lane of a street a place lies is not known: it may be passed in either direction.
+  const double fits =
+      one_way ? density(off_rad) : 0.5 * (density(off_rad) + density(off_rad + M_PI));
+  return config_.passed_wrong + (1 - config_.passed_wrong) * fits;
+}
+
 std::vector<StreetWay::OtherNear> StreetWay::OthersNear(const Eigen::Vector2d& place_m,
-                                                        double variance_m2) const {
+                                                        double variance_m2,
+                                                        double passed_rad) const {
   const double reach_m = 4 * std::sqrt(variance_m2 + config_.map_sigma_m * config_.map_sigma_m);
   std::vector<OtherNear> near;
   for (const Other& other : others_) {
     const Beside beside = BesideOf(other.from_m, other.to_m, place_m);
     if (beside.off_m > other.half_width_m + reach_m) continue;
-    near.push_back({other.to_m - other.from_m, other.layer, other.meets, other.against,
-                    Density(beside.off_m, other.half_width_m, variance_m2)});
+    const Eigen::Vector2d along = other.to_m - other.from_m;
+    near.push_back({along, other.layer, other.meets, other.against,
+                    Density(beside.off_m, other.half_width_m, variance_m2),
+                    PassedDensity(along, other.one_way, passed_rad)});
   }
   return near;
 }
@@ -185,7 +208,7 @@ std::vector<StreetWay::OtherNear> StreetWay::OthersNear(const Eigen::Vector2d& p
 /// The densest of the streets that count against the way's own: those on another level, those
 /// beside it without meeting it that are denser, and all that are much denser. Where streets meet,
 /// a place lies on both.
-double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
+double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own, double own_passed,
                                const streets::Leg& leg) const {
   const int layer = map_->StreetOf(leg.travel.segment).layer;
   const Eigen::Vector2d ahead = (leg.to_m - leg.from_m).normalized();
@@ -196,25 +219,28 @@ double StreetWay::OtherDensity(const std::vector<OtherNear>& others, double own,
     const bool other_level = other.layer != layer && !other.meets;
     const bool counts = other_level || beside || other.density > kMuchDenser * own;
     const double weight = other_level ? config_.other_level_weight : 1;
-    if (counts) most = std::max(most, weight * other.density);
+    // Both streets have what lies where they meet, whichever of them it was passed on.
+    const double fits = other.meets ? 1 : other.passed / own_passed;
+    if (counts) most = std::max(most, weight * fits * other.density);
   }
   return most;
 }
 
-StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
-                                          double variance_m2) const {
+StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m, double variance_m2,
+                                          double passed_rad) const {
   struct Best {
     double density = 0;
     double way_m = 0;
     double left_m = 0;
     std::size_t leg = 0;
+    double passed = 1;
   };
   Relation relation;
   double matched = 0;
   double open = 0;
   double chosen = 0;
   std::vector<Best> best(legs_.size());
-  const std::vector<OtherNear> others = OthersNear(place_m, variance_m2);
+  const std::vector<OtherNear> others = OthersNear(place_m, variance_m2, passed_rad);
   for (const OtherNear& other : others) {
     if (other.against) relation.against = std::max(relation.against, other.density);
   }
@@ -225,14 +251,18 @@ StreetWay::Relation StreetWay::RelationOf(const Eigen::Vector2d& place_m,
     const Beside beside = BesideOf(leg.from_m, leg.to_m, place_m);
     const double way_m = leg.start_m + beside.along_m;
     if (way_m > 0 && !(leg.before < 0 && beside.before)) {
-      const double half_m = map_->StreetOf(leg.travel.segment).HalfWidthM();
-      const double density = Density(beside.off_m, half_m, variance_m2);
-      if (density > best[i].density) best[i] = {density, way_m, beside.left_m, i};
+      const streets::Street& street = map_->StreetOf(leg.travel.segment);
+      const double density = Density(beside.off_m, street.HalfWidthM(), variance_m2);
+      if (density > best[i].density) {
+        const double passed = PassedDensity(leg.to_m - leg.from_m, street.one_way(), passed_rad);
+        best[i] = {density, way_m, beside.left_m, i, passed};
+      }
     }
     if (leg.ends <= 0) continue;
     double on_leg = 0;
     if (best[i].density > 0.01 * config_.others_per_m) {
-      const double other = OtherDensity(others, best[i].density, legs_[best[i].leg]);
+      const double other =
+          OtherDensity(others, best[i].density, best[i].passed, legs_[best[i].leg]);
       on_leg = best[i].density / (best[i].density + other + config_.others_per_m);
     }
     if (leg.open && on_leg < 0.5) {

@@ -30,6 +30,9 @@ class StreetWay {
     /// Weight of a street on another level against the way's own: more than 1 rather keeps silent
     /// where a place may lie on either.
     double other_level_weight = 1.5;
+    /// Standard deviation of the course of who passed a place, against its street, rad.
+    double passed_sigma_rad = 0.25;
+    double passed_wrong = 0.1;    ///< Share of such courses that say nothing of the street.
     double bend_from_mps = 3;     ///< A slower vehicle's course does not tell where it turns.
     double usual_way_m = 400;     ///< Way over which the usual speed is forgotten, m.
     double matched_fraction = 1;  ///< Of the fix's stated sigma that the matcher believes.
@@ -61,7 +64,8 @@ class StreetWay {
   /// next call.
   void LookAhead(const geo::LocalFrame& frame, const CourseFilter& filter, double way_m);
   /// Of a place on the plane of the last LookAhead; `variance_m2` is of the place, per axis.
-  Relation RelationOf(const Eigen::Vector2d& place_m, double variance_m2) const;
+  /// `passed_rad` is the course of a vehicle that passed it, clockwise from north; NaN: not known.
+  Relation RelationOf(const Eigen::Vector2d& place_m, double variance_m2, double passed_rad) const;
 
   /// That the vehicle is on a street of the map.
   double on_street() const { return matcher_.on_street(); }
@@ -79,6 +83,7 @@ class StreetWay {
     int layer;
     bool meets;    // The way, at a node.
     bool against;  // It is a one-way street against the vehicle's course.
+    bool one_way;  // From its begin to its end.
   };
   /// One near a place, with the density that it has there.
   struct OtherNear {
@@ -87,6 +92,7 @@ class StreetWay {
     bool meets;
     bool against;
     double density;
+    double passed;  // PassedDensity of it.
   };
 
   void FollowJunction();
@@ -94,8 +100,10 @@ class StreetWay {
   double AngleRad(const streets::Travel& from, const streets::Travel& onto) const;
   std::optional<std::uint32_t> RingEntryAhead() const;
   double Density(double off_m, double half_width_m, double variance_m2) const;
-  std::vector<OtherNear> OthersNear(const Eigen::Vector2d& place_m, double variance_m2) const;
-  double OtherDensity(const std::vector<OtherNear>& others, double own,
+  double PassedDensity(const Eigen::Vector2d& along, bool one_way, double passed_rad) const;
+  std::vector<OtherNear> OthersNear(const Eigen::Vector2d& place_m, double variance_m2,
+                                    double passed_rad) const;
+  double OtherDensity(const std::vector<OtherNear>& others, double own, double own_passed,
                       const streets::Leg& leg) const;
 
   std::shared_ptr<const streets::StreetMap> map_;

@@ -18,6 +18,7 @@ namespace {
 using Polyline = std::vector<Eigen::Vector2d>;
 
 constexpr double kMomentS = 0.2;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// Streets drawn on a plane; nodes at the same place are one.
 class DrawnStreets {
@@ -69,9 +70,10 @@ class StreetWayTest : public testing::Test {
                                              drawn_.Map());
   }
 
-  void PutHazard(std::uint8_t number, double east_m, double north_m) {
-    ASSERT_TRUE(alerts_->Put(
-        {IdOf(number), "pothole", frame_.ToGeo({east_m, north_m}), 1.0, std::nullopt}));
+  /// `course_deg` is of a vehicle that passed it, clockwise from north.
+  void PutHazard(std::uint8_t number, double east_m, double north_m, double course_deg = kUnknown) {
+    ASSERT_TRUE(alerts_->Put({IdOf(number), "pothole", frame_.ToGeo({east_m, north_m}), 1.0,
+                              std::nullopt, course_deg * M_PI / 180}));
   }
 
   /// With exact fixes, from where the vehicle is.
@@ -134,6 +136,49 @@ TEST_F(StreetWayTest, KeepsSilentWhereABridgeIsRightAbove) {
   EXPECT_FALSE(IsTold(1)) << "it may lie on either";
   EXPECT_FALSE(IsTold(2));
   EXPECT_TRUE(IsTold(3));
+}
+
+TEST_F(StreetWayTest, BelowABridgeTheDirectionOfThePassTellsWhoseHazardItIs) {
+  drawn_.Add({{0, 0}, {0, 800}});
+  drawn_.Add({{-100, 400}, {100, 400}}, false, 1);
+  Begin();
+  PutHazard(1, 0, 400, 8);
+  PutHazard(2, 0, 401, 175);
+  PutHazard(3, 0, 399, 85);
+  PutHazard(4, 1, 400, -95);
+  PutHazard(5, 0, 400);
+  DriveTo(0, 700, 14);
+  EXPECT_TRUE(IsTold(1));
+  EXPECT_TRUE(IsTold(2)) << "a vehicle on the other lane has seen it, too";
+  EXPECT_FALSE(IsTold(3)) << "it was passed on the bridge";
+  EXPECT_FALSE(IsTold(4)) << "it was passed on the bridge, the other way";
+  EXPECT_FALSE(IsTold(5)) << "it may lie on either";
+}
+
+TEST_F(StreetWayTest, BetweenTwoCarriagewaysTheDirectionOfThePassTellsWhoseHazardItIs) {
+  drawn_.Add({{0, 0}, {0, 800}}, true);
+  drawn_.Add({{-8, 800}, {-8, 0}}, true);
+  Begin();
+  PutHazard(1, -3, 400, 3);
+  PutHazard(2, -5, 420, 183);
+  PutHazard(3, -3, 440, 183);
+  DriveTo(0, 700, 14);
+  EXPECT_TRUE(IsTold(1));
+  EXPECT_FALSE(IsTold(2));
+  EXPECT_TRUE(IsTold(3)) << "one direction can be wrong: the place lies on the own carriageway";
+}
+
+TEST_F(StreetWayTest, AJunctionsSquareBelongsToBothStreetsInWhicheverDirectionItWasPassed) {
+  drawn_.Add({{0, 0}, {0, 400}});
+  drawn_.Add({{0, 400}, {0, 800}});
+  drawn_.Add({{-200, 400}, {0, 400}});
+  drawn_.Add({{0, 400}, {200, 400}});
+  Begin();
+  PutHazard(1, 1, 401, 90);
+  PutHazard(2, 1, 399, 0);
+  DriveTo(0, 700, 14);
+  EXPECT_TRUE(IsTold(1));
+  EXPECT_TRUE(IsTold(2));
 }
 
 TEST_F(StreetWayTest, AJunctionsSquareBelongsToBothStreets) {
