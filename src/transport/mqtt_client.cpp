@@ -30,6 +30,8 @@ constexpr int kPollMs = 500;
 // A connection that lived this long ends the back-off: one that is thrown out at once (another
 // client with our name, a message the broker will not have) must not hammer the broker.
 constexpr std::chrono::seconds kSettled{5};
+// LiveMap retains nothing, but not every broker can forbid it: what somebody left is not asked for.
+constexpr int kSubscribeOptions = MQTT_SUB_OPT_SEND_RETAIN_NEVER;
 
 void BlockSignalsInMqttThread() {
   sigset_t all;
@@ -235,7 +237,7 @@ class MqttClient::Connection {
     for (const std::string& topic : wanted) {
       if (!asked_.insert(topic).second) continue;
       int id = 0;
-      mosquitto_subscribe_v5(handle_.get(), &id, topic.c_str(), qos, 0, nullptr);
+      mosquitto_subscribe_v5(handle_.get(), &id, topic.c_str(), qos, kSubscribeOptions, nullptr);
       asking_[id] = topic;
     }
     // Also where nothing is new: who has just asked wants to know.
@@ -368,7 +370,7 @@ class MqttClient::Connection {
     }
     for (const MqttSubscription& subscription : subscriptions_) {
       mosquitto_subscribe_v5(handle_.get(), nullptr, subscription.filter.c_str(), subscription.qos,
-                             0, nullptr);
+                             kSubscribeOptions, nullptr);
     }
     if (callbacks_.on_connection) callbacks_.on_connection(true, "");
   }

@@ -125,7 +125,8 @@ struct MqttStatistics {
 /// library. It connects, subscribes again after every connect, reconnects with back-off for as long
 /// as it lives, and reports every answer of the broker. A QoS 1 message that was sent and not
 /// answered is sent again after a reconnect (so: duplicates happen); what is queued waits for the
-/// connection. Nothing survives the process.
+/// connection. Nothing survives the process. It does not hear of messages that a broker retained
+/// before it subscribed.
 class MqttClient {
  public:
   /// Checks the options and starts the network thread. Throws Error naming a bad option.
