@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/error.h"
 #include "test/transport/contract_broker.h"
 #include "test/transport/waiting.h"
 #include "transport/mqtt_client.h"
@@ -140,9 +141,10 @@ class BrokerContract : public ::testing::TestWithParam<BrokerKind> {
 
   /// One of each kind for all tests: to start it takes longer than they do.
   static ContractBroker& broker() {
-    std::unique_ptr<ContractBroker>& started = Started()[GetParam()];
-    if (!started) started = std::make_unique<ContractBroker>(GetParam());
-    return *started;
+    const auto [started, is_first] = Started().try_emplace(GetParam());
+    if (is_first) started->second = std::make_unique<ContractBroker>(GetParam());
+    if (!started->second) throw Error("this broker did not start; the first test says why");
+    return *started->second;
   }
 
   MqttConfig Login(const std::string& name) { return broker().Login(name); }

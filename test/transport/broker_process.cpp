@@ -74,8 +74,8 @@ TemporaryDirectory::~TemporaryDirectory() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-void ChildProcess::Start(const std::vector<std::string>& command, int port,
-                         const std::string& log) {
+void ChildProcess::Start(const std::vector<std::string>& command, int port, const std::string& log,
+                         std::chrono::seconds patience) {
   // Everything that allocates comes before the fork.
   std::vector<char*> arguments;
   for (const std::string& argument : command) {
@@ -94,7 +94,7 @@ void ChildProcess::Start(const std::vector<std::string>& command, int port,
     _exit(127);
   }
   const EventFd never;
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  const auto deadline = std::chrono::steady_clock::now() + patience;
   while (!ProbeTcp("127.0.0.1", port, 1, never.fd()).error.empty()) {
     if (waitpid(pid_, nullptr, WNOHANG) == pid_) {
       pid_ = -1;

@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -35,8 +36,9 @@ class ChildProcess {
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   /// Starts `command`, found on PATH and in /usr/sbin, with its output in `log`, and waits until
-  /// `port` answers; throws Error when it does not.
-  void Start(const std::vector<std::string>& command, int port, const std::string& log);
+  /// `port` answers; throws Error when it does not within `patience`.
+  void Start(const std::vector<std::string>& command, int port, const std::string& log,
+             std::chrono::seconds patience = std::chrono::seconds(60));
   /// Kills with SIGKILL and waits for the end.
   void Kill();
 

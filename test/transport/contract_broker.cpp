@@ -1,6 +1,7 @@
 #include "test/transport/contract_broker.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -121,7 +122,9 @@ void ContractBroker::StartEjabberd() {
       << "export ERL_LIBS HOME=" << folder << " EJABBERD_CONFIG_PATH=" << folder << "/ejabberd.yml"
       << " EJABBERD_LOG_PATH=" << folder << "/ejabberd.log\n"
       << "exec erl -noinput +sbwt none -mnesia dir '\"" << folder << "/mnesia\"' -s ejabberd\n";
-  process_.Start({"sh", folder + "/start"}, zone_address_.port, folder + "/broker.log");
+  // It computes for seconds, which are minutes on a machine that compiles meanwhile.
+  process_.Start({"sh", folder + "/start"}, zone_address_.port, folder + "/broker.log",
+                 std::chrono::seconds(300));
 }
 
 void ContractBroker::FindAddressed() {
