@@ -359,10 +359,12 @@ class MqttClient::Connection {
       return;
     }
     logged_in_ = true;
+    std::string where;
     {
       const MutexLock lock(mutex_);
       statistics_.connected = true;
       ++statistics_.connections;
+      where = statistics_.broker.host + ":" + std::to_string(statistics_.broker.port);
     }
     {
       const MutexLock lock(mutex_);
@@ -372,7 +374,7 @@ class MqttClient::Connection {
       mosquitto_subscribe_v5(handle_.get(), nullptr, subscription.filter.c_str(), subscription.qos,
                              kSubscribeOptions, nullptr);
     }
-    if (callbacks_.on_connection) callbacks_.on_connection(true, "");
+    if (callbacks_.on_connection) callbacks_.on_connection(true, where);
   }
 
   void HandleSubscribe(int id, int count, const int* granted) {

@@ -88,9 +88,10 @@ struct MqttPublishOutcome {
 struct MqttCallbacks {
   std::function<void(const MqttMessage&)> on_message;
   std::function<void(const MqttPublishOutcome&)> on_published;
-  /// After the broker accepted the login (true), and after the connection was lost (false, with the
-  /// sentence that says why). A refused attempt is a `false` as well.
-  std::function<void(bool connected, const std::string& reason)> on_connection;
+  /// After the broker accepted the login (true, with HOST:PORT of where it is), and after the
+  /// connection was lost (false, with the sentence that says why). A refused attempt is a `false`
+  /// as well.
+  std::function<void(bool connected, const std::string& where_or_why)> on_connection;
   /// Of the topics of MqttClient::Follow, those that the broker has granted on this connection,
   /// sorted: after each call of Follow, and whenever they are others than before.
   std::function<void(const std::vector<std::string>& topics)> on_followed;
