@@ -20,7 +20,7 @@ from livemap.msg import (  # noqa: E402
     ReportReceipt, VehicleCells, VehiclePosition)
 from node_testing import SOURCE_DIRECTORY  # noqa: E402
 from mqtt_bridge_fixture import (  # noqa: E402
-    Bridge, Broker, Master, Peer, WIRE_MD5, envelope, eventually, serialise, wire_payload)
+    Bridge, Broker, Master, Peer, WIRE_MD5, envelope, eventually, free_port, serialise, wire_payload)
 
 ZONE_TOPICS = {
     "sub:/hazard/report": HazardReport,
@@ -41,6 +41,7 @@ VEHICLE_TOPICS = {
     "pub:/hazard/report": HazardReport,
     "pub:/stranger/hazard/report": HazardReport,
     "pub:/counted/hazard/report": HazardReport,
+    "pub:/moved/hazard/report": HazardReport,
     "pub:/vehicle/position": VehiclePosition,
     "sub:/hazard/receipt": ReportReceipt,
     "sub:/hazard/notice": HazardNotice,
@@ -419,6 +420,16 @@ class MqttBridgeTest(unittest.TestCase):
         finally:
             counted.stop()
 
+    def test_a_bridge_takes_the_next_node_of_the_broker_when_the_first_ones_are_down(self):
+        moved = self.another_bridge("moved", port=free_port(),
+                                    other_brokers=f"[::1]:{free_port()}, 127.0.0.1:{self.broker.port}")
+        try:
+            self.assertEqual(self.vehicle_peer.diagnostics("moved")["broker"], f"127.0.0.1:{self.broker.port}")
+            self.vehicle_peer.publish("/moved/hazard/report", report("moved"))
+            eventually(lambda: self.reports_of("moved"), "the report arrives")
+        finally:
+            moved.stop()
+
     def test_flow_resumes_after_the_broker_was_killed_and_lost_its_state(self):
         self.broker.kill()
         eventually(lambda: self.vehicle_peer.diagnostics("car_bridge")["connected"] == "False",
@@ -456,6 +467,11 @@ class MqttBridgeTest(unittest.TestCase):
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice", "direction": "in",
                           "mqtt_topic": "x", "write_version": 2}]}, "accepted is 0 where the direction is in"),
             ({"password_file": "/nowhere", "password_wait_s": 0.0}, "/nowhere"),
+            ({"other_brokers": "node-2"}, "has 'node-2', accepted is HOST:PORT"),
+            ({"other_brokers": "node-2:8883,,node-3:8883"}, "has '', accepted is HOST:PORT"),
+            ({"other_brokers": "node-2:65536"}, "has 'node-2:65536', accepted is HOST:PORT"),
+            ({"other_brokers": "::1:8883"}, "has '::1:8883', accepted is HOST:PORT"),
+            ({"other_brokers": ",".join(["node:1"] * 8)}, "has 8 addresses, accepted are at most 7"),
             ({"ca_file": "/nowhere", "certificate_file": "/nowhere"}, "parameter 'key_file' of the bridge is missing"),
             ({"ca_file": "/nowhere", "certificate_file": "/nowhere", "key_file": "/nowhere"},
              "MQTT ca_file is '/nowhere', accepted is a PEM file that can be read"),

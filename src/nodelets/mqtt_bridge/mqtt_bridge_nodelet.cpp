@@ -186,8 +186,8 @@ class MqttBridgePart : public NodeletPart {
       CountOutcome(outcome);
     };
     events.on_connection = [this](const std::string& zone, bool connected,
-                                  const std::string& reason) {
-      connected ? SayConnection(zone) : SayLoss(zone, reason);
+                                  const std::string& where_or_why) {
+      connected ? SayConnection(zone, where_or_why) : SayLoss(zone, where_or_why);
       // A broker that was killed may have lost what it had for vehicles.
       if (connected && handout_) handout_->TakeBackAll();
     };
@@ -255,7 +255,10 @@ class MqttBridgePart : public NodeletPart {
   bool IsZone() const { return config_.role == ros_io::BridgeRole::kZone; }
 
   ZoneConnections::Zone ConfiguredZone() const {
-    return {config_.zone, {{config_.mqtt.host, config_.mqtt.port}}};
+    ZoneConnections::Zone zone{config_.zone, {{config_.mqtt.host, config_.mqtt.port}}};
+    zone.brokers.insert(zone.brokers.end(), config_.mqtt.fallbacks.begin(),
+                        config_.mqtt.fallbacks.end());
+    return zone;
   }
 
   /// Starts to give the zone directory to the vehicles that are heard.
@@ -453,13 +456,12 @@ class MqttBridgePart : public NodeletPart {
     return std::nullopt;
   }
 
-  void SayConnection(const std::string& zone) const {
+  void SayConnection(const std::string& zone, const std::string& where) const {
     if (FollowsZones()) {
       NODELET_INFO("connected to the broker of zone '%s' as '%s'", zone.c_str(),
                    config_.user.c_str());
     } else {
-      NODELET_INFO("connected to broker %s:%d as '%s'", config_.mqtt.host.c_str(),
-                   config_.mqtt.port, config_.user.c_str());
+      NODELET_INFO("connected to broker %s as '%s'", where.c_str(), config_.user.c_str());
     }
   }
 

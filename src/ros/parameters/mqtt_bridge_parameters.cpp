@@ -16,6 +16,8 @@ namespace {
 
 constexpr std::size_t kMaxPasswordFileBytes = 4096;
 constexpr int kMaxMessageBytes = 64 << 20;
+constexpr std::size_t kMaxOtherBrokers =
+    7;  // With the first one, as many as a zone directory names.
 
 /// One entry of the list `topics`, read key by key.
 class MqttBridgeTopicReader {
@@ -159,6 +161,45 @@ std::vector<BridgeTopic> ReadBridgeTopics(ParameterReader& parameters) {
   return topics;
 }
 
+/// One address of the list; `text` has no blanks around it.
+transport::MqttAddress ParseBrokerAddress(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  const std::string digits = colon == std::string::npos ? "" : text.substr(colon + 1);
+  std::string host = text.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);  // An IPv6 address has colons itself.
+  } else if (host.find(':') != std::string::npos) {
+    host.clear();
+  }
+  constexpr std::size_t kMostDigits = 5;
+  const bool is_number = !digits.empty() && digits.size() <= kMostDigits &&
+                         digits.find_first_not_of("0123456789") == std::string::npos;
+  const int port = is_number ? std::stoi(digits) : 0;
+  if (host.empty() || host.find_first_of(" \t[]") != std::string::npos || port < 1 ||
+      port > 65535) {
+    throw Error("parameter 'other_brokers' of the bridge has '" + text +
+                "', accepted is HOST:PORT or [IPV6]:PORT, several with commas between");
+  }
+  return {host, port};
+}
+
+std::vector<transport::MqttAddress> ParseBrokerAddresses(const std::string& list) {
+  std::vector<transport::MqttAddress> addresses;
+  if (list.find_first_not_of(" \t\n") == std::string::npos) return addresses;
+  std::stringstream parts(list);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const std::size_t begin = part.find_first_not_of(" \t\n");
+    const std::size_t end = part.find_last_not_of(" \t\n");
+    addresses.push_back(
+        ParseBrokerAddress(begin == std::string::npos ? "" : part.substr(begin, end - begin + 1)));
+  }
+  if (addresses.size() > kMaxOtherBrokers) {
+    throw Error("parameter 'other_brokers' of the bridge has " + std::to_string(addresses.size()) +
+                " addresses, accepted are at most " + std::to_string(kMaxOtherBrokers));
+  }
+  return addresses;
+}
+
 void ReadMqttConnection(ParameterReader& parameters, transport::MqttConfig& mqtt) {
   parameters.Section("Connection");
   parameters.Read(
@@ -300,6 +341,13 @@ BridgeConfig ReadBridgeConfig(ParameterReader& parameters) {
       "Name or address of the broker. The launch files set it by the argument `broker_host`.");
   parameters.Read("port", config.mqtt.port, {1, 65535},
                   "Port of the broker. The launch files set it by the argument `broker_port`.");
+  std::string other_brokers;
+  parameters.Read("other_brokers", other_brokers,
+                  "Addresses of the broker's other nodes, where it is a cluster "
+                  "(docs/how-to/run-a-broker-cluster.md): HOST:PORT, several with commas between. "
+                  "Each attempt to connect begins with host and port and takes the first that "
+                  "answers. The launch files set it by the argument `other_brokers`.");
+  config.mqtt.fallbacks = ParseBrokerAddresses(other_brokers);
   parameters.Read(
       "password_file", config.password_file,
       "File whose first line is the password. `livemap broker` writes DIRECTORY/credentials/USER. "
