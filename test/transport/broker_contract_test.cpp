@@ -254,6 +254,22 @@ TEST_P(BrokerContract, LetsAVehicleHearItsOwnTopicsAndNoOthers) {
   Expect(fault);
 }
 
+TEST_P(BrokerContract, TellsAVehicleByEachOfItsTopics) {
+  std::vector<std::string> topics = {Below("notice"), Below("notice/123012301230123")};
+  for (const char* name : kOfZone) topics.push_back(Of("1001", name));
+  Subscriptions subscriptions;
+  for (const std::string& topic : topics) subscriptions.push_back({topic, 1});
+  ContractClient car(Login("1001"), subscriptions);
+  ContractClient zone(ZoneLogin());
+  ASSERT_TRUE(car.IsReady() && zone.IsReady());
+  std::string fault;
+  for (const std::string& topic : topics) {
+    if (zone.Publish(topic, "told") != 0) fault = topic + " was not accepted";
+    if (!car.Hears(topic, "told")) fault = topic + " did not arrive";
+  }
+  Expect(fault);
+}
+
 TEST_P(BrokerContract, TellsTheVehiclesThatFollowACell) {
   const std::string here = Below("notice/123012301230123");
   const std::string there = Below("notice/123012301230120");
