@@ -55,6 +55,10 @@ std::string NameOf(BrokerKind kind) {
   return kind == BrokerKind::kEjabberd ? "ejabberd" : "addressed";
 }
 
+bool IsBrokerInstalled(BrokerKind kind) {
+  return kind != BrokerKind::kEjabberd || std::filesystem::exists("/usr/sbin/ejabberdctl");
+}
+
 bool IsBrokerAddressed() { return !FromEnvironment("LIVEMAP_TEST_BROKER").empty(); }
 
 ContractBroker::ContractBroker(BrokerKind kind) {

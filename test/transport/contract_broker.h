@@ -22,6 +22,10 @@ std::string NameOf(BrokerKind kind);
 /// Whether the environment names a broker, so that no other one is tested.
 bool IsBrokerAddressed();
 
+/// False for ejabberd where its package is not. LiveMap's development does not bring it: its
+/// package starts a chat server that listens on all addresses.
+bool IsBrokerInstalled(BrokerKind kind);
+
 /// A real broker of the zone "demo" and the certificates of its clients: "zone", the vehicles
 /// "1001" and "1002", "1003", which is revoked, and "car-1", whose name has letters. "stranger" has
 /// a certificate of another authority, with the name "1001".
