@@ -21,7 +21,6 @@ BrokerCertificate::BrokerCertificate() : context_(SSL_CTX_new(TLS_client_method(
 
 std::string BrokerCertificate::Expect(const MqttAddress& broker, const MqttTlsConfig& tls) {
   broker_ = broker;
-  is_refused_ = false;
   refusal_.clear();
   ERR_clear_error();
   if (UseFiles(tls) && ExpectHost(broker.host)) return "";
@@ -56,13 +55,11 @@ bool BrokerCertificate::ExpectHost(const std::string& host) {
 
 int BrokerCertificate::Verify(X509_STORE_CTX* store, void* self) {
   auto& certificate = *static_cast<BrokerCertificate*>(self);
-  certificate.is_refused_ = true;
   if (X509_verify_cert(store) != 1) return 0;
   if (!certificate.HasFingerprint(X509_STORE_CTX_get0_cert(store))) {
     X509_STORE_CTX_set_error(store, X509_V_ERR_APPLICATION_VERIFICATION);
     return 0;
   }
-  certificate.is_refused_ = false;
   return 1;
 }
 

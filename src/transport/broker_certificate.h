@@ -37,8 +37,6 @@ class BrokerCertificate {
   /// words where these cannot be used; empty: they can.
   std::string Expect(const MqttAddress& broker, const MqttTlsConfig& tls);
 
-  /// Whether the certificate shown since Expect was refused, for any cause.
-  bool is_refused() const { return is_refused_; }
   /// One sentence with the two fingerprints where they differ; empty: they do not, or another check
   /// has failed before.
   const std::string& refusal() const { return refusal_; }
@@ -54,7 +52,6 @@ class BrokerCertificate {
   };
   const std::unique_ptr<SSL_CTX, Deleter> context_;
   MqttAddress broker_;
-  bool is_refused_ = false;
   std::string refusal_;
 };
 

@@ -150,22 +150,29 @@ class MqttClient::Connection {
     std::string reasons;
     for (std::size_t i = 0; i < brokers_.size() && !stopping_; ++i) {
       loss_reason_.clear();
-      if (AttemptAt(brokers_[i])) return;
+      const Reception reception = AttemptAt(brokers_[i]);
+      if (reception == Reception::kLoggedIn) return;
       // Said now: if another address stands in for this one, nothing else tells of it.
-      if (certificate_.is_refused() && i + 1 < brokers_.size()) EndConnection();
+      if (reception == Reception::kRefused && i + 1 < brokers_.size()) EndConnection();
       reasons += (reasons.empty() ? "" : "; ") + loss_reason_;
     }
     loss_reason_ = reasons;
   }
 
-  /// Whether the broker is at this address: it answers, and shows a certificate that is accepted.
-  bool AttemptAt(const MqttAddress& broker) {
+  enum class Reception {
+    kSilent,   ///< Nobody listens there.
+    kRefused,  ///< By the broker, or the broker's certificate by us; or the broker did not answer.
+    kLoggedIn
+  };
+
+  /// Serves the connection to this address, if there is one, until it is lost.
+  Reception AttemptAt(const MqttAddress& broker) {
     tls_error_.clear();
     if (options_.tls) {
       tls_error_ = certificate_.Expect(broker, *options_.tls);
       if (!tls_error_.empty()) {
         Explain("cannot connect to the broker: TLS: " + tls_error_);
-        return false;
+        return Reception::kSilent;
       }
     }
     // The library's blocking connect cannot be interrupted and waits minutes for a silent host:
@@ -174,7 +181,7 @@ class MqttClient::Connection {
         ProbeTcp(broker.host, broker.port, options_.connect_timeout_s, stop_.fd());
     if (!probe.error.empty()) {
       Explain(probe.error);
-      return false;
+      return Reception::kSilent;
     }
     {
       const MutexLock lock(mutex_);
@@ -188,7 +195,7 @@ class MqttClient::Connection {
     }
     // OpenSSL's words for it are those for every certificate.
     if (!certificate_.refusal().empty()) loss_reason_ = certificate_.refusal();
-    return !certificate_.is_refused();
+    return logged_in_ ? Reception::kLoggedIn : Reception::kRefused;
   }
 
   void Serve() {

@@ -38,9 +38,9 @@ struct MqttConfig {
   std::string host = "127.0.0.1";
   int port = 1883;
   std::string fingerprint;  ///< Of the broker at host and port, as MqttAddress::fingerprint.
-  /// Other addresses of the broker: each attempt takes the first that answers, and shows a
-  /// certificate that is accepted, in this order after host and port. They are checked as those
-  /// are.
+  /// Other addresses of the broker: each attempt takes the first that answers, shows a certificate
+  /// that is accepted and accepts the login, in this order after host and port. They are checked as
+  /// those are.
   std::vector<MqttAddress> fallbacks;
   std::string client_id;  ///< Required. The broker may replace it by the user name.
   std::string user;       ///< Empty: no login.

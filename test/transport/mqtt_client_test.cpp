@@ -157,6 +157,18 @@ TEST_F(MqttClientTest, TakesTheFirstAddressThatAnswersAndNamesAllWhenNoneDoes) {
   EXPECT_THAT(car_log_.losses().back(), HasSubstr(std::to_string(broker_.port())));
 }
 
+TEST_F(MqttClientTest, AnAddressThatRefusesTheLoginIsToldAndTheNextOneTaken) {
+  BrokerProcess stranger;  // It gave car-1 another password.
+  stranger.Start();
+  MqttConfig options = Login(broker_, "car-1");
+  options.port = stranger.port();
+  options.fallbacks = {{"127.0.0.1", broker_.port()}};
+  const MqttClient car(options, {}, car_log_.Callbacks());
+  ASSERT_TRUE(Eventually([&] { return car.connected(); }));
+  EXPECT_EQ(car.statistics().broker.port, broker_.port());
+  EXPECT_THAT(car_log_.losses().at(0), HasSubstr("refused the login of 'car-1'"));
+}
+
 TEST_F(MqttClientTest, SaysThatTheLoginWasRefusedAndKeepsTrying) {
   MqttConfig options = Login(broker_, "car-1");
   options.password = "wrong";
