@@ -74,7 +74,13 @@ bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word, bool is_there) co
     return !is_same || word.sequence <= known.sequence;
   };
   const auto there = there_.find(id);
-  if (there != there_.end()) return is_old(there->second);
+  if (there != there_.end()) {
+    // The same may have been told before by a message that has no course.
+    const Word& known = there->second;
+    const bool adds_course = word.sequence == known.sequence && word.zone == known.zone &&
+                             std::isnan(known.course_rad) && !std::isnan(word.course_rad);
+    return !adds_course && is_old(known);
+  }
   const auto gone = gone_.find(id);
   if (gone == gone_.end() || !is_old(gone->second)) return false;
   // One announcement says that a hazard left a cell of the map and came into the next one.
@@ -88,7 +94,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   Changes changes;
   // The end of a catch-up says what is gone by leaving it out: the map works that out.
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
-  const Word word{notice.zone, notice.sequence};
+  const Word word{notice.zone, notice.sequence, notice.course_rad};
   const bool is_there = notice.action != Action::kRemoved;
   const bool is_valid =
       geo::IsValid(notice.position) && (!is_there || protocol::IsCourseOfPass(notice.course_rad));
@@ -103,12 +109,19 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
     ++beyond_zone_;
     return changes;
   }
-  there_[notice.hazard_uuid] = word;
-  gone_.erase(notice.hazard_uuid);
-  duplicates_.Put({notice.hazard_uuid, notice.class_name, notice.position,
-                   SigmaOf(notice.covariance_m2), std::nullopt, notice.course_rad},
-                  notice.zone, changes);
+  Take({notice.hazard_uuid, notice.class_name, notice.position, SigmaOf(notice.covariance_m2),
+        std::nullopt, notice.course_rad},
+       word, changes);
   return changes;
+}
+
+/// A word without a course takes none away.
+void AnnouncedHazards::Take(AlertHazard hazard, Word word, Changes& changes) {
+  Word& known = there_[hazard.id];
+  if (std::isnan(word.course_rad)) hazard.course_rad = word.course_rad = known.course_rad;
+  known = word;
+  gone_.erase(hazard.id);
+  duplicates_.Put(hazard, word.zone, changes);
 }
 
 /// Those that count anew: of before, only what the map still has is there.
@@ -136,11 +149,9 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
   std::vector<Uuid> removed;
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
-    const Word word{row.zone, row.sequence};
+    const Word word{row.zone, row.sequence, row.hazard.course_rad};
     if (!is_anew(row.zone) && IsOld(row.hazard.id, word, true)) continue;
-    there_[row.hazard.id] = word;
-    gone_.erase(row.hazard.id);
-    duplicates_.Put(row.hazard, row.zone, changes);
+    Take(row.hazard, word, changes);
   }
   for (auto there = there_.begin(); there != there_.end();) {
     // What is newer than all that the map has taken in will come into it yet.

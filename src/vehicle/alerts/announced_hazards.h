@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -69,9 +70,11 @@ class AnnouncedHazards {
   struct Word {
     std::string zone;
     std::uint64_t sequence = 0;
+    double course_rad = std::numeric_limits<double>::quiet_NaN();  ///< AlertHazard::course_rad.
   };
 
   bool IsOld(const Uuid& id, const Word& word, bool is_there) const;
+  void Take(AlertHazard hazard, Word word, Changes& changes);
   std::set<std::string> ZonesBegunAnew(const StoredHazards& stored) const;
 
   std::unordered_map<Uuid, Word> there_;

@@ -46,8 +46,9 @@ const std::vector<std::string>& LocalHazardMapMigrations() {
       // Of cells of the map each counts for itself, too.
       "CREATE TABLE cells(zone TEXT NOT NULL, cell INTEGER NOT NULL, sequence INTEGER NOT NULL,"
       "  PRIMARY KEY(zone, cell)) WITHOUT ROWID;",
-      // NULL where it is not known.
-      "ALTER TABLE known ADD COLUMN course_rad REAL;"};
+      // NULL where it is not known. Cells are asked about anew, for the courses of what is known.
+      "ALTER TABLE known ADD COLUMN course_rad REAL;"
+      "DELETE FROM cells;"};
   return migrations;
 }
 
@@ -623,7 +624,10 @@ LocalHazardMap::NoticeUse LocalHazardMap::TakeHazard(const protocol::Notice& not
   if (!is_removed && is_beyond_ && is_beyond_(zone, notice.position)) {
     return NoticeUse::kBeyondZone;
   }
-  if (!IsNews(notice, zone)) return NoticeUse::kTaken;
+  if (!IsNews(notice, zone)) {
+    LearnCourse(notice, zone);
+    return NoticeUse::kTaken;
+  }
   StoreNotice(notice, zone);
   changes.push_back({notice.hazard_uuid, !is_removed, notice.class_name, notice.position});
   return NoticeUse::kTaken;
@@ -688,6 +692,20 @@ bool LocalHazardMap::IsNews(const protocol::Notice& notice, const std::string& z
          (is_removed ? sequence > query.Int(1) : sequence >= query.Int(1));
 }
 
+/// Of a hazard that is known without one: the same was told before by a message that has none.
+void LocalHazardMap::LearnCourse(const protocol::Notice& notice, const std::string& zone) {
+  if (notice.action == protocol::Notice::Action::kRemoved || std::isnan(notice.course_rad)) return;
+  database_
+      ->Prepare(
+          "UPDATE known SET course_rad=?1 WHERE id=?2 AND of_zone=1 AND zone=?3 AND sequence=?4"
+          " AND course_rad IS NULL")
+      .Bind(1, notice.course_rad)
+      .BindBlob(2, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size())
+      .Bind(3, zone)
+      .Bind(4, static_cast<std::int64_t>(notice.sequence))
+      .Execute();
+}
+
 void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::string& zone) {
   const auto& id = notice.hazard_uuid.bytes;
   const auto sequence = static_cast<std::int64_t>(notice.sequence);
@@ -707,10 +725,12 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::stri
         .Execute();
     return;
   }
+  // A message without a course, as old zones and old topics have it, takes none away.
   SqliteStatement upsert = database_->Prepare(
       "INSERT OR REPLACE INTO"
       " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone,course_rad)"
-      " VALUES(?,1,?,?,?,?,?,?,?,?)");
+      " VALUES(?1,1,?2,?3,?4,?5,?6,?7,?8,"
+      " coalesce(?9,(SELECT course_rad FROM known WHERE id=?1 AND of_zone=1)))");
   upsert.BindBlob(1, id.data(), id.size())
       .Bind(2, notice.class_name)
       .Bind(3, static_cast<double>(notice.confidence))

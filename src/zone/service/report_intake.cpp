@@ -166,7 +166,10 @@ void ReportIntake::ApplyOne(const PendingReport& pending, Batch& batch,
 /// or knows no streets for which it matters.
 double ReportIntake::CourseOfPass(const protocol::Report& report, std::int64_t now_ns) const {
   if (!config_.streets) return std::numeric_limits<double>::quiet_NaN();
-  return CourseAt(vehicles_.Track(report.vehicle_id), steps_.SeenNs(report.stamp_ns, now_ns));
+  // Vehicles may say it with a turn too many; drivers are told it without.
+  return std::remainder(
+      CourseAt(vehicles_.Track(report.vehicle_id), steps_.SeenNs(report.stamp_ns, now_ns)),
+      2 * M_PI);
 }
 
 /// What several vehicles saw counts against none of them, so that only a vehicle that nobody else

@@ -166,6 +166,43 @@ TEST(AnnouncedHazardsTest, TheCourseOfThePassComesByNoticeAndByTheLocalMap) {
   EXPECT_DOUBLE_EQ(changes.put[0].course_rad, 1.5);
 }
 
+TEST(AnnouncedHazardsTest, ACourseThatIsToldLaterIsTakenAndNoneIsTakenAway) {
+  const test::TemporaryDirectory directory;
+  LocalHazardMap::Config config;
+  config.path = directory.path() + "/map.sqlite3";
+  LocalHazardMap map(config, protocol::HazardCatalogue(), 0);
+  const protocol::Notice without = NoticeOf(1, Action::kAdded, 1);
+  protocol::Notice with = without;
+  with.course_rad = 1.5;
+  protocol::Notice newer = NoticeOf(1, Action::kUpdated, 2);
+  AnnouncedHazards hazards;
+  const auto course_in_map = [&] {
+    return ReadStoredHazards(config.path)->rows[0].hazard.course_rad;
+  };
+  const auto hear = [&](const protocol::Notice& notice) {
+    map.Apply(std::vector<protocol::Notice>{notice});
+    return hazards.Apply(notice).put;
+  };
+  ASSERT_EQ(hear(without).size(), 1U);
+  EXPECT_TRUE(std::isnan(course_in_map()));
+  const auto again = hear(with);
+  ASSERT_EQ(again.size(), 1U) << "the same announcement, with a course";
+  EXPECT_DOUBLE_EQ(again[0].course_rad, 1.5);
+  EXPECT_DOUBLE_EQ(course_in_map(), 1.5);
+  EXPECT_TRUE(hear(with).empty()) << "it is known now";
+  const auto update = hear(newer);
+  ASSERT_EQ(update.size(), 1U);
+  EXPECT_DOUBLE_EQ(update[0].course_rad, 1.5) << "by a message that has none";
+  EXPECT_DOUBLE_EQ(course_in_map(), 1.5);
+  AnnouncedHazards by_map;
+  by_map.Apply(StoredHazards{{RowOf(1, 5)}, {{"", 5}}});
+  StoredHazards::Row row = RowOf(1, 5);
+  row.hazard.course_rad = -0.5;
+  const auto learned = by_map.Apply(StoredHazards{{row}, {{"", 5}}});
+  ASSERT_EQ(learned.put.size(), 1U);
+  EXPECT_DOUBLE_EQ(learned.put[0].course_rad, -0.5);
+}
+
 TEST(AnnouncedHazardsTest, ALocalMapFromBeforeItHadCoursesIsReadOnceItHasThem) {
   const test::TemporaryDirectory directory;
   LocalHazardMap::Config config;

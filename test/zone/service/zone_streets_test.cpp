@@ -154,6 +154,15 @@ TEST_F(ZoneStreetsTest, ABrokenCourseInTheStoreIsLeftOutAndTold) {
   EXPECT_TRUE(std::isnan(zone.Find(hazard)->course_rad));
 }
 
+TEST_F(ZoneStreetsTest, ACourseWithATurnTooManyIsToldWithout) {
+  ZoneService zone(WithStreets(), Clock(), 1);
+  const Uuid hazard = Pass(zone, "car-1", 0, -4, kWest + 2 * M_PI);
+  EXPECT_NEAR(std::remainder(zone.Find(hazard)->course_rad - kWest, 2 * M_PI), 0, 1e-6);
+  EXPECT_LE(std::abs(zone.Find(hazard)->course_rad), 3.1416);
+  const Uuid other = Pass(zone, "car-2", 0, -300, kEast - 4 * M_PI);
+  EXPECT_LE(std::abs(zone.Find(other)->course_rad), 3.1416);
+}
+
 TEST_F(ZoneStreetsTest, ACourseThatIsNotCommittedIsForgotten) {
   ZoneService zone(WithStreets(), Clock(), 1);
   const Uuid hazard = Pass(zone, "car-1", 0, -300, kNan);
