@@ -127,6 +127,9 @@ void WebSocketSession::Read() {
 }
 
 void WebSocketSession::Deliver(const LiveMessage& message) {
+  // Decided here: a thousand vehicles would wake each of many clients a thousand times a second.
+  const bool is_vehicle = message.sequence == 0;
+  if (is_vehicle && !sees_.vehicles) return;
   boost::asio::post(stream_.get_executor(),
                     [self = shared_from_this(), message] { self->OnMessage(message); });
 }
@@ -135,7 +138,6 @@ void WebSocketSession::OnMessage(const LiveMessage& message) {
   if (state_ == State::kClosing) return;
   const WebConfig& options = slot_.context().options;
   const bool is_vehicle = message.sequence == 0;
-  if (is_vehicle && !sees_.vehicles) return;
   if (is_vehicle) {
     // A position is soon followed by the next: it never fills a queue that hazards need.
     if (state_ != State::kLive || queue_.size() > options.max_queued_messages / 2) return;
