@@ -33,8 +33,8 @@ class MapViewers {
   };
   struct Result {
     std::size_t connected = 0;    ///< At the end, of those that are not slow.
-    std::size_t slow_closed = 0;  ///< By the zone, with the code for one that is too slow.
-    std::size_t lost = 0;         ///< Connections that ended otherwise.
+    std::size_t slow_closed = 0;  ///< Connections of slow ones that have ended.
+    std::size_t lost = 0;         ///< The same of others.
     std::string first_loss;       ///< Why.
     std::vector<Heard> heard;     ///< While it counted.
   };

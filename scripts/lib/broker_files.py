@@ -26,8 +26,9 @@ def require_id(text, what):
 
 def require_vehicle(text):
     require_id(text, "vehicle")
-    if text == ZONE_USER:
-        raise Usage(f"vehicle '{ZONE_USER}' is not accepted, it is the name of the zone's own login")
+    # Some brokers take A for a.
+    if text.lower() == ZONE_USER:
+        raise Usage(f"vehicle '{text}' is not accepted, it is the name of the zone's own login")
     return text
 
 

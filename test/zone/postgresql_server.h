@@ -70,8 +70,8 @@ class PostgresqlServer {
     }
     Fail("the server does not start, see " + folder_ + "/server.log");
   }
-  /// SIGKILL leaves it no time to finish anything. Returns when the processes that it had are gone,
-  /// too: until they notice, they go on to answer.
+  /// SIGKILL leaves it no time to finish anything. Waits until the processes that it had are gone,
+  /// too, six seconds at most: until they notice, they go on to answer.
   void Kill(int signal) {
     if (process_ <= 0) return;
     const std::vector<pid_t> children = Children(process_);

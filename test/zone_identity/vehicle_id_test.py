@@ -16,7 +16,7 @@ import certificate_authority  # noqa: E402
 
 ROUNDS = 20000
 CORPUS = [
-    "car-1", "zone", "bus_7.north", ".", "..", "../zone", "a/b", "car\n", "car\nuser zone", "+", "#", "$SYS",
+    "car-1", "zone", "Zone", "bus_7.north", ".", "..", "../zone", "a/b", "car\n", "car\nuser zone", "+", "#", "$SYS",
     "car 1", "", "x" * 64, "x" * 65, "caf\u00e9", "\u202ecar", "car\x00", "-rf", "%u", "127.0.0.1", "::1",
     "fe80::1%eth0", "host.example", "host..example", "-host", "*.example", "a" * 300, "1.2.3.4\n",
 ]
@@ -66,7 +66,7 @@ class Names(unittest.TestCase):
             self.assertEqual(os.path.basename(os.path.normpath("/certificates/" + text)), text)
             self.assertRegex(text, re.compile(r"\A[!-~]{1,64}\Z"))
             self.assertFalse(set(text) & set("/+#$%:"), text)
-            self.assertNotEqual(text, broker_files.ZONE_USER)
+            self.assertNotEqual(text.lower(), broker_files.ZONE_USER)
         self.assertGreater(accepted, 100)
 
     def test_a_host_is_one_that_a_certificate_can_carry(self):

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::size_t kMaxPasswordFileBytes = 4096;
 constexpr int kMaxMessageBytes = 64 << 20;
-constexpr std::size_t kMaxOtherBrokers =
-    7;  // With the first one, as many as a zone directory names.
+/// With the first one, as many as a zone directory names.
+constexpr std::size_t kMaxOtherBrokers = 7;
 
 /// One entry of the list `topics`, read key by key.
 class MqttBridgeTopicReader {

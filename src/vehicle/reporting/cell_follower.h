@@ -39,8 +39,9 @@ class CellFollower {
     double hysteresis_m = 300;
     std::size_t max_cells = 48;  ///< The nearest ones; at most protocol::kMaxRequestedCells.
     double refresh_s = 60;       ///< After an answer the vehicle asks again.
-    /// Without an answer; doubled each time. The connection loses none, so one is only late: asked
-    /// for again, it would come twice, which a zone with much to tell has no time for.
+    /// Without an answer; doubled each time. While the connection lasts an answer is seldom lost
+    /// and often late: asked for again, it comes twice, for which a zone with much to tell has no
+    /// time.
     double retry_s = 20;
     double longest_retry_s = 60;
     double rest_s = 5;  ///< From an answer to a question about what it left open.
