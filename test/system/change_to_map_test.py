@@ -29,8 +29,8 @@ from listening_port import free_port  # noqa: E402
 from node_testing import eventually  # noqa: E402
 
 SPEED_MPS, SECONDS, RATE_HZ = 8, 15, 5
-# Half the speed: the network has the time it has on a vehicle, whatever else this machine does.
-REPLAY_RATE = 0.5
+# A third of the speed: the network has the time it has on a vehicle, whatever else this machine does.
+REPLAY_RATE = 0.35
 REMOVED_M, STANDING_M, BARRIER_M = 42, 66, 88
 LEFT_M = -3.4
 LATITUDE, LONGITUDE = 48.8566, 9.0  # Of the world's origin; the road goes east.
