@@ -74,6 +74,7 @@ protocol::CellNews::Cell CellPublisher::Read(const protocol::CellRequest::Cell& 
     hazard.position = known->position;
     hazard.stamp_ns = known->updated_ns;
     hazard.course_rad = known->course_rad;
+    hazard.trails = known->trails;
     cell.hazards.push_back(std::move(hazard));
   }
   return cell;

@@ -9,6 +9,7 @@
 #include "common/uuid.h"
 #include "geo/map_cell.h"
 #include "geo/wgs84.h"
+#include "protocol/trail.h"
 
 namespace livemap::protocol {
 
@@ -42,6 +43,7 @@ struct CellNews {
     std::int64_t stamp_ns = 0;  ///< Of its last event, zone clock (UTC).
     /// As Notice::course_rad.
     double course_rad = std::numeric_limits<double>::quiet_NaN();
+    std::vector<Trail> trails{};  ///< As Notice::trails.
   };
   struct Cell {
     geo::MapCell cell;

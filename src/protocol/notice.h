@@ -11,6 +11,7 @@
 #include "common/uuid.h"
 #include "geo/map_cell.h"
 #include "geo/wgs84.h"
+#include "protocol/trail.h"
 
 namespace livemap::protocol {
 
@@ -42,6 +43,7 @@ struct Notice {
   std::int64_t last_seen_ns = 0;                            ///< Image stamp of the newest report.
   /// Of a vehicle that passed the hazard, clockwise from true north, as IsCourseOfPass accepts it.
   double course_rad = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Trail> trails{};      ///< How vehicles passed it, at most kMaxTrails.
   double radius_m = 0;              ///< kCaughtUp: around `position`.
   std::uint32_t told = 0;           ///< kCaughtUp: hazards told since the kCaughtUp before.
   std::string image_format;         ///< "jpeg", or empty when there is no picture.

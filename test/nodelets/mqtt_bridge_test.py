@@ -16,7 +16,8 @@ import genmsg.msg_loader  # noqa: E402
 import rostest  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from livemap.msg import (  # noqa: E402
-    CellHazard, CellHazards, CellRequest, CellState, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, MapChange,
+    CellHazard, CellHazards, CellRequest, CellState, HazardNotice, HazardPoll, HazardPollAnswer, HazardReport, HazardTrail,
+    MapChange,
     ReportReceipt, VehicleCells, VehiclePosition)
 from node_testing import SOURCE_DIRECTORY  # noqa: E402
 from mqtt_bridge_fixture import (  # noqa: E402
@@ -76,9 +77,11 @@ CELL_OF_48_1, CELL_OF_48_3 = 414198550, 414196534
 MD5_OF_VERSION_1 = "6c9f383b83ba26551f53b42caa304fa7"
 # Of VehiclePosition.msg before it had its last 4 bytes.
 MD5_OF_POSITIONS_2 = "9146c7869de30f12ed97927d98d9681d"
-# Of HazardNotice.msg and CellHazards.msg before they had courses, their last 4 bytes where there is none.
+# Of HazardNotice.msg and CellHazards.msg before they had courses and trails, their last 8 bytes where there are none,
+# and before they had trails, the last 4.
 MD5_OF_NOTICES_2 = "88d23041ceb511154d96daa5ff718aef"
 MD5_OF_CELL_HAZARDS_1 = "83fa272e40c3f88a9c695865cbe9209e"
+MD5_OF_CELL_HAZARDS_2 = "ef3eb3b08eefca405332cf9c2d023276"
 
 
 class MqttBridgeTest(unittest.TestCase):
@@ -310,14 +313,22 @@ class MqttBridgeTest(unittest.TestCase):
                                        if m.drive_id == "of version 2"], "it arrives")[0]
         self.assertEqual((received.schema_version, received.vehicle_id, received.outbox_age), (2, "car-2", 0))
 
-    def test_cells_of_a_zone_that_tells_no_courses_arrive(self):
+    def test_cells_of_a_zone_that_tells_no_courses_or_no_trails_arrive(self):
         cells = CellHazards(schema_version=1, cells=[CellState(cell=7, hazards=1)],
                             hazards=[CellHazard(class_name="pothole", sequence=303)])
         self.broker.publish_raw("zone", "livemap/v1/test/vehicle/car-1/cell_hazards",
-                                envelope(cells, md5=MD5_OF_CELL_HAZARDS_1, payload=wire_payload(cells)[:-4]))
+                                envelope(cells, md5=MD5_OF_CELL_HAZARDS_1, payload=wire_payload(cells)[:-8]))
         news = eventually(lambda: [m for m in self.vehicle_peer.received("/hazard/cell_hazards")
                                    if m.hazards and m.hazards[0].sequence == 303], "the cell arrives")[0]
         self.assertEqual((news.schema_version, list(news.courses)), (1, []))
+        cells.schema_version = 2
+        cells.hazards[0].sequence = 306
+        cells.courses = [1.5]
+        self.broker.publish_raw("zone", "livemap/v1/test/vehicle/car-1/cell_hazards",
+                                envelope(cells, md5=MD5_OF_CELL_HAZARDS_2, payload=wire_payload(cells)[:-4]))
+        news = eventually(lambda: [m for m in self.vehicle_peer.received("/hazard/cell_hazards")
+                                   if m.hazards and m.hazards[0].sequence == 306], "the cell arrives")[0]
+        self.assertEqual((news.schema_version, list(news.courses), news.trails), (2, [1.5], []))
         # The login of the plain client has ended the connection of the zone's bridge.
         self.zone_peer.publish("/hazard/vehicle_notice", HazardNotice(vehicle_id="car-1", sequence=305))
         eventually(lambda: 305 in [n.sequence for n in self.vehicle_peer.received("/hazard/notice")],
@@ -325,23 +336,27 @@ class MqttBridgeTest(unittest.TestCase):
 
     def test_who_is_told_alone_is_told_as_version_2_defines_it_and_reads_that(self):
         self.zone_peer.publish("/hazard/vehicle_notice", HazardNotice(
-            schema_version=3, vehicle_id="car-1", sequence=302, class_name="pothole", course=1.5))
+            schema_version=HazardNotice.SCHEMA_VERSION, vehicle_id="car-1", sequence=302, class_name="pothole",
+            course=1.5, trails=[HazardTrail(offsets=[0, -500, 0, 500])]))
         received = eventually(lambda: [m for m in self.vehicle_peer.received("/hazard/notice") if m.sequence == 302],
                               "the notice arrives")[0]
-        self.assertEqual((received.schema_version, received.class_name, received.course), (2, "pothole", 0))
+        self.assertEqual((received.schema_version, received.class_name, received.course, received.trails),
+                         (2, "pothole", 0, []))
 
     def test_vehicles_that_know_no_cells_are_told_as_version_2_defines_it(self):
         path = os.path.join(self.broker.directory, "raw_notice")
         listener = self.broker.subscribe_raw("car-2", "livemap/v1/test/notice", path)
-        notice = HazardNotice(schema_version=3, sequence=304, class_name="pothole", course=1.5)
+        notice = HazardNotice(schema_version=HazardNotice.SCHEMA_VERSION, sequence=304, class_name="pothole", course=1.5,
+                              trails=[HazardTrail(offsets=[0, -500, 0, 500])])
 
         def arrived():
             self.zone_peer.publish("/hazard/notice", notice)
             return listener.poll() is not None
         eventually(arrived, "the raw payload arrives")
         notice.schema_version = 2
+        notice.trails = []
         with open(path, "rb") as file:
-            self.assertEqual(file.read(), envelope(notice, md5=MD5_OF_NOTICES_2, payload=wire_payload(notice)[:-4]))
+            self.assertEqual(file.read(), envelope(notice, md5=MD5_OF_NOTICES_2, payload=wire_payload(notice)[:-8]))
 
     def test_the_zone_in_a_message_stays_on_the_vehicle_and_comes_from_the_topic(self):
         path = os.path.join(self.broker.directory, "raw")
@@ -463,7 +478,7 @@ class MqttBridgeTest(unittest.TestCase):
                           "direction": "sideways", "mqtt_topic": "x"}]}, "accepted is in or out"),
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice", "direction": "out",
                           "mqtt_topic": "x", "write_version": 1}]},
-             "'livemap/HazardNotice' cannot be written as version 1, accepted is 0 (the present one), 2"),
+             "'livemap/HazardNotice' cannot be written as version 1, accepted is 0 (the present one), 2, 3"),
             ({"topics": [{"name": "x", "ros_topic": "x", "type": "livemap/HazardNotice", "direction": "in",
                           "mqtt_topic": "x", "write_version": 2}]}, "accepted is 0 where the direction is in"),
             ({"password_file": "/nowhere", "password_wait_s": 0.0}, "/nowhere"),

@@ -31,9 +31,9 @@ def port_answers(port):
 
 # Of the definitions on the wire, which have no field `zone`.
 WIRE_MD5 = {
-    "livemap/CellHazards": "ef3eb3b08eefca405332cf9c2d023276",
+    "livemap/CellHazards": "1703bed8d13e8657113584719179292f",
     "livemap/CellRequest": "eceb8c87685360e56aeb929ad7c324e1",
-    "livemap/HazardNotice": "635a641ecabd332c30bfc02d4414dff3",
+    "livemap/HazardNotice": "03acdf49de664439a0bbf08c02931b45",
     "livemap/HazardPoll": "78c6f168c0bc4ed892e7fbea24487d70",
     "livemap/HazardPollAnswer": "8f9e01f2a6d515909b89b0b9949f6e21",
     "livemap/HazardReport": "157e70184e3e48f3be020c650d2f788a",

@@ -47,6 +47,12 @@ template <typename Message>
 struct HasCourses<Message, std::void_t<decltype(std::declval<Message&>().courses)>>
     : std::true_type {};
 
+template <typename Message, typename = void>
+struct HasTrails : std::false_type {};
+template <typename Message>
+struct HasTrails<Message, std::void_t<decltype(std::declval<Message&>().trails)>> : std::true_type {
+};
+
 /// Of a serialised text before its characters.
 constexpr std::size_t kTextLengthBytes = 4;
 
@@ -114,7 +120,11 @@ class TypedBridge : public BridgedType {
   /// With nothing in the arrays that the earlier definition does not have.
   Message AsEarlier(Message message) const {
     message.schema_version = static_cast<std::uint16_t>(written()->version);
-    if constexpr (HasCourses<Message>::value) message.courses.clear();
+    constexpr int kCellsWithCourses = 2;
+    if constexpr (HasTrails<Message>::value) message.trails.clear();
+    if constexpr (HasCourses<Message>::value) {
+      if (written()->version < kCellsWithCourses) message.courses.clear();
+    }
     return message;
   }
 
@@ -158,15 +168,17 @@ std::pair<const std::string, Factory> BridgedTypeEntry(
 
 /// A new message type joins the bridge by one line here. Of reports and polls version 1 did not say
 /// what a picture shows, of positions version 2 not how old the outbox is, and what a zone tells of
-/// hazards did not have their courses.
+/// hazards did not have their courses, and then not their trails.
 const std::map<std::string, Factory>& BridgedTypeRegistry() {
   static const std::map<std::string, Factory> kRegistry = {
       BridgedTypeEntry<CandidateFrame>("", {"image.data"}),
-      BridgedTypeEntry<CellHazards>("ef3eb3b08eefca405332cf9c2d023276", {},
-                                    {{1, "83fa272e40c3f88a9c695865cbe9209e", 4}}),
+      BridgedTypeEntry<CellHazards>(
+          "1703bed8d13e8657113584719179292f", {},
+          {{1, "83fa272e40c3f88a9c695865cbe9209e", 8}, {2, "ef3eb3b08eefca405332cf9c2d023276", 4}}),
       BridgedTypeEntry<CellRequest>("eceb8c87685360e56aeb929ad7c324e1"),
-      BridgedTypeEntry<HazardNotice>("635a641ecabd332c30bfc02d4414dff3", {"image.data"},
-                                     {{2, "88d23041ceb511154d96daa5ff718aef", 4}}),
+      BridgedTypeEntry<HazardNotice>(
+          "03acdf49de664439a0bbf08c02931b45", {"image.data"},
+          {{2, "88d23041ceb511154d96daa5ff718aef", 8}, {3, "635a641ecabd332c30bfc02d4414dff3", 4}}),
       BridgedTypeEntry<HazardPoll>("78c6f168c0bc4ed892e7fbea24487d70", {},
                                    {{1, "71097a76ee723564ac4d8188dc96c5b0", 1}}),
       BridgedTypeEntry<HazardPollAnswer>("8f9e01f2a6d515909b89b0b9949f6e21", {"image.data"}),

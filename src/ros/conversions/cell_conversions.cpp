@@ -7,9 +7,13 @@
 #include "common/error.h"
 #include "ros/conversions/hazard_conversions.h"
 #include "ros/conversions/message_fields.h"
+#include "ros/conversions/trail_conversions.h"
 
 namespace livemap::ros_io {
 namespace {
+
+/// As many elements as a bridge takes.
+constexpr std::size_t kMaxTrailsOfMessage = 1024;
 
 geo::MapCell ToMapCell(std::uint32_t number, const char* message_name) {
   const auto cell = geo::MapCell::FromNumber(number);
@@ -83,6 +87,20 @@ protocol::CellRequest FromMessage(const CellRequest& message) {
   return request;
 }
 
+/// Those of each hazard of the message.
+std::vector<std::vector<protocol::Trail>> TrailsOf(const CellHazards& message) {
+  std::vector<std::vector<protocol::Trail>> trails(message.hazards.size());
+  for (const HazardTrail& trail : message.trails) {
+    if (trail.hazard >= message.hazards.size()) {
+      throw Error("message of cells has a trail of hazard " + std::to_string(trail.hazard) +
+                  ", accepted is less than " + std::to_string(message.hazards.size()));
+    }
+    const CellHazard& hazard = message.hazards[trail.hazard];
+    TakeTrail(trail, {hazard.latitude, hazard.longitude}, "message of cells", trails[trail.hazard]);
+  }
+  return trails;
+}
+
 CellHazards ToMessage(const protocol::CellNews& news) {
   CellHazards message;
   message.schema_version = CellHazards::SCHEMA_VERSION;
@@ -96,6 +114,10 @@ CellHazards ToMessage(const protocol::CellNews& news) {
     message.cells.push_back(state);
     for (const protocol::CellNews::Hazard& hazard : cell.hazards) {
       message.hazards.push_back(ToCellMessage(hazard));
+      if (message.trails.size() + protocol::kMaxTrails <= kMaxTrailsOfMessage) {
+        AppendTrails(hazard.trails, hazard.position,
+                     static_cast<std::uint16_t>(message.courses.size()), message.trails);
+      }
       message.courses.push_back(static_cast<float>(hazard.course_rad));
     }
   }
@@ -116,6 +138,7 @@ protocol::CellNews FromMessage(const CellHazards& message) {
                 std::to_string(courses) +
                 " courses, accepted is one course for each hazard, or none at all");
   }
+  const std::vector<std::vector<protocol::Trail>> trails = TrailsOf(message);
   auto next = message.hazards.begin();
   for (const CellState& state : message.cells) {
     const auto left = static_cast<std::size_t>(message.hazards.end() - next);
@@ -128,10 +151,11 @@ protocol::CellNews FromMessage(const CellHazards& message) {
     cell.hazards.reserve(state.hazards);
     for (std::uint32_t i = 0; i < state.hazards; ++i) {
       cell.hazards.push_back(FromCellMessage(*next));
+      const auto number = static_cast<std::size_t>(next - message.hazards.begin());
       if (courses != 0) {
-        const auto number = static_cast<std::size_t>(next - message.hazards.begin());
         cell.hazards.back().course_rad = static_cast<double>(message.courses[number]);
       }
+      cell.hazards.back().trails = trails[number];
       ++next;
     }
     news.cells.push_back(std::move(cell));

@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "ros/conversions/message_fields.h"
+#include "ros/conversions/trail_conversions.h"
 
 namespace livemap::ros_io {
 
@@ -133,6 +134,7 @@ protocol::Notice NoticeOf(const zone::Hazard& hazard) {
   notice.first_seen_ns = hazard.first_seen_ns;
   notice.last_seen_ns = hazard.last_seen_ns;
   notice.course_rad = hazard.course_rad;
+  notice.trails = hazard.trails;
   return notice;
 }
 
@@ -193,6 +195,7 @@ HazardNotice ToMessage(const protocol::Notice& notice) {
   message.image.format = notice.image_format;
   message.image.data = notice.image;
   message.course = static_cast<float>(notice.course_rad);
+  AppendTrails(notice.trails, notice.position, 0, message.trails);
   message.zone = notice.zone;
   return message;
 }
@@ -236,6 +239,9 @@ protocol::Notice FromMessage(const HazardNotice& message) {
   notice.image = message.image.data;
   if (message.schema_version > kWithoutCourse) {
     notice.course_rad = static_cast<double>(message.course);
+  }
+  for (const HazardTrail& trail : message.trails) {
+    TakeTrail(trail, notice.position, "hazard notice", notice.trails);
   }
   notice.zone = message.zone;
   return notice;

@@ -98,6 +98,11 @@ void ReadZoneReportLimits(ParameterReader& parameters, zone::ZoneService::Config
       "replay", zone.replay,
       "true: drives are played back. Reports count as of their arrival, and max_age_s does not "
       "hold. Never use it in a zone that drivers rely on: it lets old reports in.");
+  parameters.Read(
+      "hazard_trails", zone.hazard_trails,
+      "true: vehicles are told how the first two vehicles that reported a hazard passed it: 300 m "
+      "of their ways before and behind it, without their names. Drivers without a street file are "
+      "warned in time in bends by that, and not of other streets.");
   parameters.ReadChoice<zone::UnknownClasses>(
       "unknown_classes", zone.unknown_classes,
       {{"other", zone::UnknownClasses::kOther}, {"refuse", zone::UnknownClasses::kRefuse}},

@@ -6,9 +6,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/uuid.h"
 #include "geo/wgs84.h"
+#include "protocol/trail.h"
 #include "zone/model/hazard_state.h"
 
 namespace livemap::zone {
@@ -37,6 +39,7 @@ struct Hazard {
   std::uint64_t announced_sequence = 0;
   /// Of a vehicle that saw it, clockwise from north: how the place is passed. NaN: not known.
   double course_rad = std::numeric_limits<double>::quiet_NaN();
+  std::vector<protocol::Trail> trails{};  ///< How vehicles passed it, at most kMaxTrails.
 };
 
 /// What happened to the officials' map; as stored: the numbers never change.

@@ -94,7 +94,9 @@ void HazardRegistry::Restore(const Hazard& hazard, const PresenceRecord& life, s
   record.picture = PackedPicture(hazard.image_sha256, hazard.image_format);
   record.life = life;
   last_id_ = std::max(last_id_, id);
-  changes_.push_back({record.sequence, Append(record)});
+  const Slot slot = Append(record);
+  SetTrails(slot, hazard.trails);
+  changes_.push_back({record.sequence, slot});
 }
 
 std::optional<HazardRegistry::Slot> HazardRegistry::FindMatch(const std::string& class_name,
@@ -234,6 +236,20 @@ void HazardRegistry::SetCourse(Slot slot, double course_rad) {
   records_[slot].course_rad = static_cast<float>(course_rad);
 }
 
+void HazardRegistry::SetTrails(Slot slot, std::vector<protocol::Trail> trails) {
+  if (trails.empty()) {
+    trails_.erase(slot);
+  } else {
+    trails_[slot] = std::move(trails);
+  }
+}
+
+const std::vector<protocol::Trail>& HazardRegistry::Trails(Slot slot) const {
+  static const std::vector<protocol::Trail> none;
+  const auto known = trails_.find(slot);
+  return known == trails_.end() ? none : known->second;
+}
+
 void HazardRegistry::SetPicture(Slot slot, const PictureName& picture) {
   RememberForUndo(slot);
   records_[slot].picture = PackedPicture(picture.sha256, picture.format);
@@ -264,6 +280,7 @@ Hazard HazardRegistry::Get(Slot slot) const {
   hazard.vehicles = Supporters(record.life);
   hazard.announced_sequence = record.announced_sequence;
   hazard.course_rad = static_cast<double>(record.course_rad);
+  hazard.trails = Trails(slot);
   return hazard;
 }
 

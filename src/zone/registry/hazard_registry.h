@@ -94,6 +94,11 @@ class HazardRegistry {
             std::uint64_t sequence, std::int64_t now_ns);
   /// In which direction the place is passed (Hazard::course_rad).
   void SetCourse(Slot slot, double course_rad);
+  /// How vehicles passed the place (Hazard::trails). Rollback leaves them: the caller sets those of
+  /// before.
+  void SetTrails(Slot slot, std::vector<protocol::Trail> trails);
+  /// Empty where none is known.
+  const std::vector<protocol::Trail>& Trails(Slot slot) const;
   /// A newer picture.
   void SetPicture(Slot slot, const PictureName& picture);
   /// Drivers are told of the hazard as it is now.
@@ -173,7 +178,8 @@ class HazardRegistry {
   protocol::HazardCatalogue catalogue_;
   std::uint64_t hash_seed_;
   FusionRule rule_;
-  HazardRecords records_;  ///< By slot.
+  HazardRecords records_;                                          ///< By slot.
+  std::unordered_map<Slot, std::vector<protocol::Trail>> trails_;  ///< Of those that have any.
   UuidIndex slots_;
   std::vector<Class> classes_;
   std::unordered_map<std::string, std::uint32_t> class_places_;  ///< By name, in classes_.

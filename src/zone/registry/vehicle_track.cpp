@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <limits>
 
 #include "common/time.h"
@@ -49,7 +51,85 @@ bool SeesBetweenTrackPoints(const TrackPoint& a, const TrackPoint& b, const Eige
   return false;
 }
 
+constexpr double kTrailM = 300;  // Before and behind the place.
+constexpr double kShortestTrailM = 30;
+constexpr double kHiddenM = 100;  // Where a drive begins or ends.
+constexpr double kPassM = 60;     // From where a vehicle sees what it then passes.
+constexpr double kPassWindowS = 30;
+constexpr double kMaxTrailGapM = 100;  // Between two places of one way.
+
+using Places = std::vector<Eigen::Vector2d>;
+
+/// The first of the places after `length_m` of way.
+Places::iterator AfterWay(Places& places, double length_m) {
+  double sum_m = 0;
+  for (auto place = places.begin(); place != places.end(); ++place) {
+    if (place != places.begin()) sum_m += (*place - *std::prev(place)).norm();
+    if (sum_m >= length_m) return place;
+  }
+  return places.end();
+}
+
+/// The way from the track's point `from` on, in steps of `step`, up to kTrailM; the first place is
+/// that of `from`. `ends`: the track ends before, standing.
+Places WayAlong(const std::vector<TrackPoint>& track, const geo::LocalFrame& frame,
+                std::size_t from, std::ptrdiff_t step, bool& ends) {
+  Places places{frame.ToEnu(track[from].position)};
+  double length_m = 0;
+  auto at = static_cast<std::ptrdiff_t>(from);
+  for (;;) {
+    at += step;
+    if (at < 0 || at >= static_cast<std::ptrdiff_t>(track.size())) break;
+    const TrackPoint& point = track[static_cast<std::size_t>(at)];
+    if (!geo::IsValid(point.position)) return places;
+    const Eigen::Vector2d place_m = frame.ToEnu(point.position);
+    const double way_m = (place_m - places.back()).norm();
+    if (!(way_m < kMaxTrailGapM)) return places;
+    if (way_m < kMinTravelM) continue;
+    places.push_back(place_m);
+    length_m += way_m;
+    if (length_m >= kTrailM) return places;
+  }
+  const TrackPoint& last = step < 0 ? track.front() : track.back();
+  ends = !(last.speed_mps >= kMinCourseMps);
+  return places;
+}
+
 }  // namespace
+
+protocol::Trail TrailPast(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
+                          const geo::GeoPoint& place) {
+  if (!geo::IsValid(place)) return {};
+  const geo::LocalFrame frame(place);
+  std::size_t nearest = track.size();
+  double nearest_m = kPassM;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const bool counts = geo::IsValid(track[i].position) &&
+                        std::abs(Seconds(track[i].stamp_ns - stamp_ns)) <= kPassWindowS;
+    const double distance_m = counts ? frame.ToEnu(track[i].position).norm() : kPassM;
+    if (distance_m >= nearest_m) continue;
+    nearest_m = distance_m;
+    nearest = i;
+  }
+  if (nearest == track.size()) return {};
+  bool begins_here = false;
+  bool ends_here = false;
+  Places places = WayAlong(track, frame, nearest, -1, begins_here);
+  std::reverse(places.begin(), places.end());
+  const Places after = WayAlong(track, frame, nearest, 1, ends_here);
+  places.insert(places.end(), std::next(after.begin()), after.end());
+  if (begins_here) places.erase(places.begin(), AfterWay(places, kHiddenM));
+  if (ends_here) {
+    std::reverse(places.begin(), places.end());
+    places.erase(places.begin(), AfterWay(places, kHiddenM));
+    std::reverse(places.begin(), places.end());
+  }
+  if (places.size() < 2 || AfterWay(places, kShortestTrailM) == places.end()) return {};
+  protocol::Trail trail;
+  for (const Eigen::Vector2d& each_m : places) trail.push_back(frame.ToGeo(each_m));
+  trail = protocol::SimplifiedTrail(trail);
+  return protocol::ValidTrails({trail}, place).empty() ? protocol::Trail{} : trail;
+}
 
 bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
               const geo::GeoPoint& place, const SightRule& rule) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "geo/wgs84.h"
+#include "protocol/trail.h"
 
 namespace livemap::zone {
 
@@ -34,5 +35,12 @@ bool CouldSee(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
 /// at the point nearest in time where it moved, else the direction of its way within 5 s before and
 /// after. NaN where the track has no point so near in time, or it stood.
 double CourseAt(const std::vector<TrackPoint>& track, std::int64_t stamp_ns);
+
+/// How a vehicle of this track passed `place`, which it saw at `stamp_ns`: up to 300 m of its way
+/// before and behind the place, where it is within 60 m of the place at some time within 30 s of
+/// the stamp. Where a drive began or ended nearby is nobody's business: of a way that begins or
+/// ends standing the last 100 m to that place are left out. Empty where less than 30 m is left.
+protocol::Trail TrailPast(const std::vector<TrackPoint>& track, std::int64_t stamp_ns,
+                          const geo::GeoPoint& place);
 
 }  // namespace livemap::zone

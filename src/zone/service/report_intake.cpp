@@ -29,7 +29,7 @@ std::vector<protocol::Receipt> ReportIntake::Batch::TakeReceipts() {
 ReportIntake::ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps,
                            ImageStore& images, PictureAllowance& pictures,
                            VehicleAllowance& allowance, PlaceBook& places,
-                           const VehicleTable& vehicles)
+                           const VehicleTable& vehicles, TrailCollector& trails)
     : config_(config),
       state_(state),
       steps_(steps),
@@ -37,7 +37,8 @@ ReportIntake::ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSte
       pictures_(pictures),
       allowance_(allowance),
       places_(places),
-      vehicles_(vehicles) {}
+      vehicles_(vehicles),
+      trails_(trails) {}
 
 ReportIntake::Batch ReportIntake::Examine(const std::vector<protocol::Report>& reports,
                                           std::int64_t now_ns) {
@@ -209,6 +210,7 @@ ReportIntake::Slot ReportIntake::Register(const protocol::Report& report, double
                                 transaction.TakeSequence(), now_ns);
   transaction.NameHazard(slot, report.class_name);
   if (!std::isnan(course_rad)) transaction.KeepCourse(slot, course_rad);
+  trails_.Note(slot, report.vehicle_id, steps_.SeenNs(report.stamp_ns, now_ns), transaction);
   PresenceRecord life;
   const Evidence evidence =
       steps_.EvidenceOf(EvidenceKind::kSighting, report.vehicle_id, report.stamp_ns, now_ns);
@@ -242,6 +244,10 @@ void ReportIntake::Sight(Slot slot, const protocol::Report& report, double cours
   const bool is_new_course = says != SightingSays::kNothing && !std::isnan(course_rad) &&
                              std::isnan(state_.hazards.Record(slot).course_rad);
   if (is_new_course) transaction.KeepCourse(slot, course_rad);
+  // A vehicle's first sighting that counts: its further ones have the same trail.
+  if (says == SightingSays::kWhere) {
+    trails_.Note(slot, report.vehicle_id, steps_.SeenNs(report.stamp_ns, now_ns), transaction);
+  }
   steps_.Keep(slot, life, step, transaction);
   transaction.RecordHazardEvent(slot, before,
                                 step.transition ? step.transition->reason : "sighting", true);

@@ -17,6 +17,7 @@
 #include "zone/places/place_book.h"
 #include "zone/registry/vehicle_table.h"
 #include "zone/service/hazard_steps.h"
+#include "zone/service/trail_collector.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
 #include "zone/service/zone_statistics.h"
@@ -55,7 +56,7 @@ class ReportIntake {
   /// All outlive it.
   ReportIntake(const ZoneConfig& config, ZoneState& state, HazardSteps& steps, ImageStore& images,
                PictureAllowance& pictures, VehicleAllowance& allowance, PlaceBook& places,
-               const VehicleTable& vehicles);
+               const VehicleTable& vehicles, TrailCollector& trails);
 
   /// First pass, which changes nothing: what was committed before, what is refused, pictures to
   /// disk. A picture whose report is never committed is unreferenced and goes first. `reports`
@@ -91,6 +92,7 @@ class ReportIntake {
   VehicleAllowance& allowance_;
   PlaceBook& places_;
   const VehicleTable& vehicles_;
+  TrailCollector& trails_;
 };
 
 }  // namespace livemap::zone

@@ -56,6 +56,9 @@ struct ZoneConfig {
   /// Drives are played back: what vehicles say is as old as its arrival, whatever its stamps say,
   /// and max_age_s does not hold. Never in a zone that drivers rely on: it lets old reports in.
   bool replay = false;
+  /// Vehicles are told how others passed hazards (Hazard::trails), up to 300 m of their ways,
+  /// without their names.
+  bool hazard_trails = true;
   protocol::HazardCatalogue catalogue;
   /// Those of the zone, by which places have names and carriageways; null: the zone knows none.
   std::shared_ptr<const streets::StreetMap> streets;

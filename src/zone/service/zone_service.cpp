@@ -54,7 +54,9 @@ ZoneService::ZoneService(Config config, Clock now_ns, std::uint64_t uuid_seed)
       allowance_(config_.allowance),
       pictures_(config_.pictures),
       steps_(config_, state_),
-      reports_(config_, state_, steps_, images_, pictures_, allowance_, places_, vehicles_),
+      trails_(config_, state_, vehicles_),
+      reports_(config_, state_, steps_, images_, pictures_, allowance_, places_, vehicles_,
+               trails_),
       map_changes_(config_, state_, places_),
       polls_(config_, state_, steps_, images_, pictures_, allowance_, vehicles_, places_),
       officials_(config_, state_, steps_),
@@ -200,6 +202,7 @@ void ZoneService::Advance() {
   }
   const MutexLock writer(writer_mutex_);
   LetHazardsAge();
+  CompleteTrails();
   places_.SaveCounts();
   places_.ForgetOld(now_ns_());
   if (config_.picture_days > 0) {
@@ -240,6 +243,18 @@ void ZoneService::LetHazardsAge() {
   }
   ageing_.Reschedule(due, transaction.now_ns());
   FollowUp(transaction);
+}
+
+/// Drivers hear of it with what is told of the hazard next.
+void ZoneService::CompleteTrails() {
+  ZoneTransaction transaction(StateForWriter(), now_ns_());
+  const std::vector<TrailCollector::Pass> due = trails_.TakeDue(transaction.now_ns());
+  if (due.empty()) return;
+  const WriterLock lock(data_mutex_);
+  Commit(transaction, [&] {
+    writer_mutex_.AssertHeld();
+    trails_.Complete(due, transaction);
+  });
 }
 
 template <typename Decide>

@@ -41,6 +41,7 @@
 #include "zone/service/official_actions.h"
 #include "zone/service/poll_coordinator.h"
 #include "zone/service/report_intake.h"
+#include "zone/service/trail_collector.h"
 #include "zone/service/vehicle_claims.h"
 #include "zone/service/zone_config.h"
 #include "zone/service/zone_state.h"
@@ -311,6 +312,7 @@ class ZoneService : public MapReader {
   void Schedule(Slot slot, std::int64_t now_ns) REQUIRES(writer_mutex_);
   void PublishVehicle(VehicleState vehicle) REQUIRES(telling_mutex_);
   void LetHazardsAge() REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  void CompleteTrails() REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
   template <typename Decide>
   std::optional<std::uint64_t> DecideHazard(const Decide& decide);
   template <typename Change>
@@ -378,6 +380,7 @@ class ZoneService : public MapReader {
   VehicleAllowance allowance_ GUARDED_BY(writer_mutex_);
   PictureAllowance pictures_;  ///< refused: any thread.
   HazardSteps steps_ GUARDED_BY(writer_mutex_);
+  TrailCollector trails_ GUARDED_BY(writer_mutex_);
   ReportIntake reports_ GUARDED_BY(writer_mutex_);
   MapChangeIntake map_changes_ GUARDED_BY(writer_mutex_);
   PollCoordinator polls_;      ///< SetVehicle: any thread.

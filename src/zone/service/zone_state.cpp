@@ -40,10 +40,17 @@ void ZoneState::Load() {
   std::unordered_map<std::uint64_t, double> courses;
   damage += store.LoadCourses(
       [&](std::uint64_t id, double course_rad) { courses.emplace(id, course_rad); });
+  std::unordered_map<std::uint64_t, std::vector<protocol::Trail>> trails;
+  damage += store.LoadTrails([&](std::uint64_t id, std::vector<protocol::Trail> known) {
+    trails.emplace(id, std::move(known));
+  });
   damage += store.LoadHazards([&](const ZoneStore::HazardRow& row) {
     Hazard hazard = row.hazard;
     const auto course = courses.find(row.id);
     if (course != courses.end()) hazard.course_rad = course->second;
+    const auto known = trails.find(row.id);
+    if (known != trails.end())
+      hazard.trails = protocol::ValidTrails(known->second, hazard.position);
     // A store of before the catalogue ruled may hold any names.
     hazard.class_name = hazards.HeadingOf(hazard.class_name);
     hazards.Restore(hazard, row.life, static_cast<std::uint32_t>(row.id));

@@ -27,6 +27,7 @@ void ZoneTransaction::Commit() {
 
 void ZoneTransaction::Rollback() {
   state_.store.Rollback();
+  for (const auto& [slot, before] : trails_before_) state_.hazards.SetTrails(slot, before);
   state_.hazards.Rollback();
   state_.map_changes.Rollback();
   for (const auto& [class_name, before] : learned_before_) {
@@ -114,6 +115,12 @@ void ZoneTransaction::KeepCourse(Slot slot, double course_rad) {
   courses_[slot] = course_rad;
 }
 
+void ZoneTransaction::KeepTrails(Slot slot, std::vector<protocol::Trail> trails) {
+  // The first time only: a failed transaction takes back all of them.
+  trails_before_.emplace(slot, state_.hazards.Trails(slot));
+  state_.hazards.SetTrails(slot, std::move(trails));
+}
+
 void ZoneTransaction::RecordMapChangeEvent(MapChangeEvent event) {
   ++sequence_;
   map_change_events_.push_back(std::move(event));
@@ -156,6 +163,9 @@ void ZoneTransaction::Write() {
   }
   for (const auto& [slot, course_rad] : courses_) {
     store.WriteCourse(state_.hazards.Record(slot).id, course_rad);
+  }
+  for (const auto& [slot, before] : trails_before_) {
+    store.WriteTrails(state_.hazards.Record(slot).id, state_.hazards.Trails(slot));
   }
   for (std::size_t i = 0; i < hazard_events_.size(); ++i) {
     store.WriteEvent(hazard_events_[i], places_[i].hazard_id, places_[i].previous_sequence);

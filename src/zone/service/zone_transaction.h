@@ -89,6 +89,8 @@ class ZoneTransaction {
   void KeepHazard(Slot slot) { touched_.push_back(slot); }
   /// The hazard is passed in this direction: in memory and in the store.
   void KeepCourse(Slot slot, double course_rad);
+  /// Vehicles passed the hazard by these trails: the same.
+  void KeepTrails(Slot slot, std::vector<protocol::Trail> trails);
   /// The event, whose sequence was `sequence() + 1`.
   void RecordMapChangeEvent(MapChangeEvent event);
 
@@ -137,7 +139,8 @@ class ZoneTransaction {
   std::vector<Slot> touched_;                     ///< Repeats until it is written.
   std::map<Slot, std::string> reported_classes_;  ///< Of new hazards.
   std::set<Slot> renamed_;
-  std::map<Slot, double> courses_;                         ///< Of hazards that had none.
+  std::map<Slot, double> courses_;  ///< Of hazards that had none.
+  std::map<Slot, std::vector<protocol::Trail>> trails_before_;
   std::map<std::string, LearnedLifetime> learned_before_;  ///< By class.
   std::map<std::uint64_t, TrustRecord> trust_before_;      ///< By vehicle.
   std::vector<AcceptedReport> reports_;

@@ -123,7 +123,11 @@ HazardTable::HazardTable(StoreConnection& connection)
                     "INSERT INTO hazard_courses (hazard_id, course_rad) VALUES (:i, :c) "
                     "ON CONFLICT (hazard_id) DO UPDATE SET "
                     "course_rad = excluded.course_rad",
-                    {row_.id, row_.course_rad}) {}
+                    {row_.id, row_.course_rad}),
+      write_trails_(connection,
+                    "INSERT INTO hazard_trails (hazard_id, trails) VALUES (:i, :t) "
+                    "ON CONFLICT (hazard_id) DO UPDATE SET trails = excluded.trails",
+                    {row_.id, row_.trails}) {}
 
 ZoneStore::HazardRow HazardTable::ToHazard(const Row& row) {
   ZoneStore::HazardRow result;
@@ -231,6 +235,21 @@ StoreDamage HazardTable::LoadCourses(const std::function<void(std::uint64_t, dou
   });
 }
 
+StoreDamage HazardTable::LoadTrails(
+    const std::function<void(std::uint64_t, std::vector<protocol::Trail>)>& take) {
+  return ExplainStore("loading the trails of hazards", [&] {
+    long long id = 0;
+    std::string trails;
+    soci::statement query =
+        (connection_.session().prepare << "SELECT hazard_id, trails FROM hazard_trails",
+         soci::into(id), soci::into(trails));
+    return LoadRows(connection_, "hazard_trails", query, [&] {
+      if (id < 1 || id > kMaxRowId) throw Error("hazard " + std::to_string(id) + " has trails");
+      take(static_cast<std::uint64_t>(id), protocol::ParseTrails(trails));
+    });
+  });
+}
+
 void HazardTable::WriteClass(std::uint64_t hazard_id, const std::string& class_name) {
   ExplainStore("writing a hazard's class", [&] {
     const auto id = static_cast<long long>(hazard_id);
@@ -244,6 +263,14 @@ void HazardTable::WriteCourse(std::uint64_t hazard_id, double course_rad) {
     row_.id = static_cast<long long>(hazard_id);
     row_.course_rad = std::remainder(course_rad, kFullTurnRad);
     write_course_.Execute();
+  });
+}
+
+void HazardTable::WriteTrails(std::uint64_t hazard_id, const std::vector<protocol::Trail>& trails) {
+  ExplainStore("writing the trails of a hazard", [&] {
+    row_.id = static_cast<long long>(hazard_id);
+    row_.trails = protocol::TrailsText(trails);
+    write_trails_.Execute();
   });
 }
 

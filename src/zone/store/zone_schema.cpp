@@ -512,6 +512,16 @@ const Statements& ZoneSchemaToVersion9() {
   return kStatements;
 }
 
+/// How vehicles passed hazards, as protocol::TrailsText writes it. Hazards of before have none.
+const Statements& ZoneSchemaToVersion10() {
+  static const Statements kStatements{
+      R"(CREATE TABLE IF NOT EXISTS hazard_trails (
+           hazard_id BIGINT PRIMARY KEY,
+           trails TEXT NOT NULL))",
+      "INSERT INTO livemap_schema (version) VALUES (10)"};
+  return kStatements;
+}
+
 int ZoneSchemaVersion(soci::session& session) {
   session << "CREATE TABLE IF NOT EXISTS livemap_schema (version INTEGER NOT NULL)";
   int version = 0;
@@ -537,7 +547,8 @@ void MigrateZoneStore(StoreConnection& connection, const std::string& database) 
   const std::array<const Statements*, kZoneSchemaVersion> steps{
       &ZoneSchemaToVersion1(), &ZoneSchemaToVersion2(), &ZoneSchemaToVersion3(),
       &ZoneSchemaToVersion4(), &ZoneSchemaToVersion5(), &ZoneSchemaToVersion6(),
-      &ZoneSchemaToVersion7(), &ZoneSchemaToVersion8(), &ZoneSchemaToVersion9()};
+      &ZoneSchemaToVersion7(), &ZoneSchemaToVersion8(), &ZoneSchemaToVersion9(),
+      &ZoneSchemaToVersion10()};
   int step = version;
   if (connection.is_postgresql() && version == 0) {
     soci::transaction transaction(session);

@@ -7,7 +7,7 @@
 namespace livemap::zone {
 
 /// The schema that this program writes.
-constexpr int kZoneSchemaVersion = 9;
+constexpr int kZoneSchemaVersion = 10;
 
 /// The first that databases of PostgreSQL have.
 constexpr int kPostgresqlBegins = 8;

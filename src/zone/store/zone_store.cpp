@@ -331,6 +331,11 @@ StoreDamage ZoneStore::LoadCourses(const std::function<void(std::uint64_t, doubl
   return implementation_->writer().hazards.LoadCourses(take);
 }
 
+StoreDamage ZoneStore::LoadTrails(
+    const std::function<void(std::uint64_t, std::vector<protocol::Trail>)>& take) {
+  return implementation_->writer().hazards.LoadTrails(take);
+}
+
 StoreDamage ZoneStore::LoadLives(
     const std::function<void(const std::string&, LearnedLifetime)>& take) {
   return implementation_->writer().learned.LoadLives(take);
@@ -479,6 +484,10 @@ void ZoneStore::WriteClass(std::uint64_t hazard_id, const std::string& class_nam
 
 void ZoneStore::WriteCourse(std::uint64_t hazard_id, double course_rad) {
   implementation_->writer().hazards.WriteCourse(hazard_id, course_rad);
+}
+
+void ZoneStore::WriteTrails(std::uint64_t hazard_id, const std::vector<protocol::Trail>& trails) {
+  implementation_->writer().hazards.WriteTrails(hazard_id, trails);
 }
 
 void ZoneStore::WriteReport(const protocol::Report& report, std::uint64_t hazard_id,

@@ -80,6 +80,9 @@ class ZoneStore {
   StoreDamage LoadHazards(const std::function<void(HazardRow)>& take);
   /// The directions in which hazards are passed, by id of the hazard, radians clockwise from north.
   StoreDamage LoadCourses(const std::function<void(std::uint64_t, double)>& take);
+  /// How vehicles passed hazards, by id of the hazard.
+  StoreDamage LoadTrails(
+      const std::function<void(std::uint64_t, std::vector<protocol::Trail>)>& take);
   StoreDamage LoadLives(const std::function<void(const std::string&, LearnedLifetime)>& take);
   StoreDamage LoadTrust(const std::function<void(std::uint64_t, const TrustRecord&)>& take);
   /// The greatest id that a row of a hazard has, sound or not; 0 without rows. What lies beyond the
@@ -177,6 +180,8 @@ class ZoneStore {
   void WriteClass(std::uint64_t hazard_id, const std::string& class_name);
   /// Adds the course, or replaces that of the same hazard.
   void WriteCourse(std::uint64_t hazard_id, double course_rad);
+  /// The same for its trails.
+  void WriteTrails(std::uint64_t hazard_id, const std::vector<protocol::Trail>& trails);
   void WriteReport(const protocol::Report& report, std::uint64_t hazard_id,
                    const std::string& image_sha256, std::int64_t received_ns);
   /// `previous_sequence`: of the hazard's event before; 0 without one.

@@ -96,6 +96,43 @@ TEST(CellConversionsTest, CoursesStayWithTheirHazards) {
   EXPECT_THROW(FromMessage(message), Error);
 }
 
+TEST(CellConversionsTest, TrailsStayWithTheirHazards) {
+  protocol::CellNews news;
+  news.cells.push_back({kHere, 0, 20, {PotholeOfCell(1), PotholeOfCell(2)}});
+  news.cells.push_back({kThere, 0, 20, {PotholeOfCell(3)}});
+  protocol::CellNews::Hazard& one = news.cells[0].hazards[1];
+  const geo::LocalFrame frame(one.position);
+  one.trails = {{frame.ToGeo({-80, 2}), frame.ToGeo({90, 2})},
+                {frame.ToGeo({0, -50}), frame.ToGeo({0, 0}), frame.ToGeo({60, 0})}};
+  CellHazards message = ToMessage(news);
+  const protocol::CellNews back = FromMessage(message);
+  EXPECT_TRUE(back.cells[0].hazards[0].trails.empty());
+  EXPECT_TRUE(back.cells[1].hazards[0].trails.empty());
+  const std::vector<protocol::Trail>& trails = back.cells[0].hazards[1].trails;
+  ASSERT_EQ(trails.size(), 2U);
+  ASSERT_EQ(trails[1].size(), 3U);
+  EXPECT_LT(geo::GeodesicDistanceM(trails[0][0], one.trails[0][0]), 0.1);
+  EXPECT_LT(geo::GeodesicDistanceM(trails[1][2], one.trails[1][2]), 0.1);
+  message.trails[0].hazard = 3;
+  EXPECT_THROW(FromMessage(message), Error) << "of a hazard that is not there";
+  message.trails[0].hazard = 1;
+  message.trails[0].offsets.pop_back();
+  EXPECT_THROW(FromMessage(message), Error) << "half a place";
+  message = ToMessage(news);
+  message.trails.push_back(message.trails[0]);
+  EXPECT_THROW(FromMessage(message), Error) << "three of one hazard";
+}
+
+TEST(CellConversionsTest, ACellFullOfHazardsStaysWithinWhatABridgeTakes) {
+  protocol::CellNews news;
+  news.cells.push_back({kHere, 0, 2000, {}});
+  protocol::CellNews::Hazard hazard = PotholeOfCell(1);
+  const geo::LocalFrame frame(hazard.position);
+  hazard.trails.assign(2, {frame.ToGeo({-80, 2}), frame.ToGeo({90, 2})});
+  news.cells[0].hazards.assign(protocol::kMaxHazardsOfCell, hazard);
+  EXPECT_LE(ToMessage(news).trails.size(), 1024U);
+}
+
 TEST(CellConversionsTest, AZoneOfVersion1TellsNoCourses) {
   protocol::CellNews news;
   news.cells.push_back({kHere, 0, 20, {PotholeOfCell(1)}});

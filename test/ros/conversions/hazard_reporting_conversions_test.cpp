@@ -335,6 +335,19 @@ TEST(HazardConversions, ANoticeTellsTheCourseThatTheZoneKnows) {
   EXPECT_TRUE(std::isnan(FromMessage(ToMessage(event)).course_rad));
 }
 
+TEST(HazardConversions, ANoticeTellsTheTrailsThatTheZoneKnows) {
+  zone::HazardEvent event;
+  event.hazard.position = {49.2, 7.0};
+  const geo::LocalFrame frame(event.hazard.position);
+  event.hazard.trails = {{frame.ToGeo({-100, 0}), frame.ToGeo({250, 10})}};
+  const protocol::Notice notice = FromMessage(ToMessage(event));
+  ASSERT_EQ(notice.trails.size(), 1U);
+  EXPECT_LT(geo::GeodesicDistanceM(notice.trails[0][1], event.hazard.trails[0][1]), 0.1);
+  // A hazard that an official moved far away keeps none.
+  event.hazard.position = {49.3, 7.0};
+  EXPECT_TRUE(FromMessage(ToMessage(event)).trails.empty());
+}
+
 TEST(HazardConversions, ANoticeOfVersion2TellsNoCourse) {
   HazardNotice message = ToMessage(protocol::Notice{});
   message.schema_version = 2;
