@@ -52,6 +52,7 @@ protocol::Notice MakeNotice(std::uint8_t number) {
   notice.confidence = 0.5F;
   notice.position = {40 + 0.1 * number, 8};
   notice.course_rad = 0.5;
+  notice.trails = {{notice.position, {40.001 + 0.1 * number, 8}}};
   return notice;
 }
 

@@ -19,6 +19,15 @@ double SigmaOf(const Eigen::Matrix2d& covariance_m2) {
   return std::isfinite(sigma_m) ? sigma_m : 0;
 }
 
+/// None for a text that is no trails: another program may have written it.
+std::vector<protocol::Trail> StoredTrails(const std::string& text) {
+  try {
+    return protocol::ParseTrails(text);
+  } catch (const Error&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
@@ -31,14 +40,14 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
   if (!tables.Step() || tables.Int(0) != 4) return std::nullopt;
   tables.Reset();
   SqliteStatement course =
-      database.Prepare("SELECT count(*) FROM pragma_table_info('known') WHERE name='course_rad'");
+      database.Prepare("SELECT count(*) FROM pragma_table_info('known') WHERE name='trails'");
   if (!course.Step() || course.Int(0) != 1) return std::nullopt;
   course.Reset();
   StoredHazards stored;
   database.Transaction([&] {
     SqliteStatement rows = database.Prepare(
         "SELECT id,class_name,latitude,longitude,sequence,substr(zone,1,64),"
-        " course_rad,typeof(course_rad)='real' FROM known"
+        " course_rad,typeof(course_rad)='real',trails,typeof(trails)='text' FROM known"
         " WHERE of_zone=1 AND sequence>0 AND typeof(id)='blob' AND length(id)=16");
     while (rows.Step()) {
       StoredHazards::Row row;
@@ -49,6 +58,7 @@ std::optional<StoredHazards> ReadStoredHazards(const std::string& path) {
       row.sequence = static_cast<std::uint64_t>(rows.Int(4));
       row.zone = rows.Text(5);
       if (rows.Int(7) != 0) row.hazard.course_rad = rows.Real(6);
+      if (rows.Int(9) != 0) row.hazard.trails = StoredTrails(rows.Text(8));
       if (geo::IsValid(row.hazard.position) && protocol::IsCourseOfPass(row.hazard.course_rad)) {
         stored.rows.push_back(row);
       }
@@ -75,11 +85,12 @@ bool AnnouncedHazards::IsOld(const Uuid& id, const Word& word, bool is_there) co
   };
   const auto there = there_.find(id);
   if (there != there_.end()) {
-    // The same may have been told before by a message that has no course.
+    // The same may have been told before by a message that does not say how it is passed.
     const Word& known = there->second;
-    const bool adds_course = word.sequence == known.sequence && word.zone == known.zone &&
-                             std::isnan(known.course_rad) && !std::isnan(word.course_rad);
-    return !adds_course && is_old(known);
+    const bool is_same = word.sequence == known.sequence && word.zone == known.zone;
+    const bool adds_course = std::isnan(known.course_rad) && !std::isnan(word.course_rad);
+    const bool adds_trails = !word.trails.empty() && !protocol::AreSame(word.trails, known.trails);
+    return !(is_same && (adds_course || adds_trails)) && is_old(known);
   }
   const auto gone = gone_.find(id);
   if (gone == gone_.end() || !is_old(gone->second)) return false;
@@ -94,7 +105,8 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
   Changes changes;
   // The end of a catch-up says what is gone by leaving it out: the map works that out.
   if (notice.action == Action::kCaughtUp || notice.hazard_uuid.IsNil()) return changes;
-  const Word word{notice.zone, notice.sequence, notice.course_rad};
+  const std::vector<protocol::Trail> trails = protocol::ValidTrails(notice.trails, notice.position);
+  const Word word{notice.zone, notice.sequence, notice.course_rad, trails};
   const bool is_there = notice.action != Action::kRemoved;
   const bool is_valid =
       geo::IsValid(notice.position) && (!is_there || protocol::IsCourseOfPass(notice.course_rad));
@@ -110,15 +122,16 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const protocol::Notice& notice
     return changes;
   }
   Take({notice.hazard_uuid, notice.class_name, notice.position, SigmaOf(notice.covariance_m2),
-        std::nullopt, notice.course_rad},
+        std::nullopt, notice.course_rad, trails},
        word, changes);
   return changes;
 }
 
-/// A word without a course takes none away.
+/// A word without a course or trails takes none away.
 void AnnouncedHazards::Take(AlertHazard hazard, Word word, Changes& changes) {
   Word& known = there_[hazard.id];
   if (std::isnan(word.course_rad)) hazard.course_rad = word.course_rad = known.course_rad;
+  if (word.trails.empty()) hazard.trails = word.trails = known.trails;
   known = word;
   gone_.erase(hazard.id);
   duplicates_.Put(hazard, word.zone, changes);
@@ -149,7 +162,7 @@ AnnouncedHazards::Changes AnnouncedHazards::Apply(const StoredHazards& stored) {
   std::vector<Uuid> removed;
   for (const StoredHazards::Row& row : stored.rows) {
     in_map.insert(row.hazard.id);
-    const Word word{row.zone, row.sequence, row.hazard.course_rad};
+    const Word word{row.zone, row.sequence, row.hazard.course_rad, row.hazard.trails};
     if (!is_anew(row.zone) && IsOld(row.hazard.id, word, true)) continue;
     Take(row.hazard, word, changes);
   }

@@ -71,6 +71,7 @@ class AnnouncedHazards {
     std::string zone;
     std::uint64_t sequence = 0;
     double course_rad = std::numeric_limits<double>::quiet_NaN();  ///< AlertHazard::course_rad.
+    std::vector<protocol::Trail> trails{};                         ///< AlertHazard::trails.
   };
 
   bool IsOld(const Uuid& id, const Word& word, bool is_there) const;

@@ -63,6 +63,7 @@ bool DriverAlerts::Put(const AlertHazard& hazard) {
     Known& known = known_[found->second];
     grid_.Move(known.hazard.position, hazard.position, found->second);
     known = {hazard, urgency};
+    known.hazard.trails = protocol::ValidTrails(hazard.trails, hazard.position);
     return true;
   }
   if (numbers_.size() >= config_.max_hazards) {
@@ -77,6 +78,7 @@ bool DriverAlerts::Put(const AlertHazard& hazard) {
     free_numbers_.pop_back();
     known_[number] = {hazard, urgency};
   }
+  known_[number].hazard.trails = protocol::ValidTrails(hazard.trails, hazard.position);
   grid_.Insert(hazard.position, number);
   numbers_.emplace(hazard.id, number);
   return true;
@@ -103,6 +105,7 @@ std::vector<HazardAlert> DriverAlerts::StartAnew() {
   std::vector<HazardAlert> told;
   ForgetFar({}, told);
   filter_.Reset();
+  driven_.clear();
   if (street_way_) street_way_->Reset();
   frame_.reset();
   newest_ns_.reset();
@@ -116,6 +119,21 @@ double DriverAlerts::LeadS(int urgency, double speed_mps) const {
   return std::max(config_.min_lead_s, stopping_s) + (urgency <= 1 ? config_.urgent_extra_s : 0);
 }
 
+/// Keeps where the vehicle drove just now, for the trails.
+void DriverAlerts::Remember() {
+  constexpr double kApartM = 3;
+  constexpr std::size_t kMost = 30;
+  const DrivenPlace now{filter_.state().head<2>(), filter_.state()[CourseFilter::kCourse]};
+  const bool moved =
+      driven_.size() < 2 || (now.place_m - driven_[driven_.size() - 2].place_m).norm() > kApartM;
+  if (moved) {
+    driven_.push_back(now);
+  } else {
+    driven_.back() = now;
+  }
+  if (driven_.size() > kMost) driven_.pop_front();
+}
+
 /// A plane whose datum is near the vehicle.
 void DriverAlerts::FollowVehicle(const geo::GeoPoint& position) {
   if (!frame_) {
@@ -127,8 +145,10 @@ void DriverAlerts::FollowVehicle(const geo::GeoPoint& position) {
   frame_.emplace(position);
   if (place_m.norm() > 2 * kMaxFrameM) {
     filter_.Reset();
+    driven_.clear();
   } else {
     filter_.MoveOrigin(place_m);
+    for (DrivenPlace& driven : driven_) driven.place_m -= place_m;
   }
 }
 
@@ -159,12 +179,51 @@ bool DriverAlerts::OnOtherLevel(const AlertHazard& hazard, std::optional<double>
          std::abs(*hazard.altitude_m - *altitude_m) > config_.max_altitude_difference_m;
 }
 
+/// By the ways on which others came to the hazard, and where the vehicle is on none of them, by the
+/// course.
+void DriverAlerts::WeighTrails(const AlertHazard& hazard, const Eigen::Vector2d& place_m,
+                               double fix_variance_m2, WayAhead::Relation& relation,
+                               Near& near) const {
+  near.on_way = false;
+  TrailWay::Relation best;
+  double most = 1;
+  double least = 1;
+  for (const protocol::Trail& trail : hazard.trails) {
+    std::vector<Eigen::Vector2d> trail_m;
+    for (const geo::GeoPoint& place : trail) trail_m.push_back(frame_->ToEnu(place));
+    const TrailWays ways = SplitTrail(trail_m, place_m);
+    bool beside = false;
+    for (const auto& way_m : {ways.as_it_came_m, ways.as_it_went_m}) {
+      const TrailWay::Relation way =
+          TrailWay(config_.trails, way_m).RelationOf(driven_, filter_, fix_variance_m2);
+      beside = beside || way.beside;
+      if (way.on * way.follows >= best.on * best.follows) best = way;
+    }
+    const double evidence =
+        TrailEvidence(config_.trails, ways.course_rad, relation.course_rad, beside);
+    most = std::max(most, evidence);
+    least = std::min(least, evidence);
+  }
+  const double own = relation.probability * most * least;
+  const double corridor = relation.ahead ? own / (own + 1 - relation.probability) : 0;
+  const double by_trail = best.on * best.follows;
+  // Who is on no such way, or leaves it, may come to the hazard all the same.
+  const double by_course = (1 - by_trail) * corridor;
+  if (by_trail > by_course) {
+    relation.ahead = true;
+    relation.way_m = best.way_m;
+    near.on_way = by_trail > 0.9;
+  }
+  relation.probability = by_trail + by_course;
+}
+
 /// By the streets as far as they are known and driven, else by the course.
 WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& known,
                                             double fix_variance_m2, Near& near) const {
   const double sigma_m = known.hazard.sigma_m > 0 ? known.hazard.sigma_m : config_.default_sigma_m;
   const Eigen::Vector2d place_m = frame_->ToEnu(known.hazard.position);
   WayAhead::Relation relation = way.RelationOf(place_m, sigma_m * sigma_m + fix_variance_m2);
+  WeighTrails(known.hazard, place_m, fix_variance_m2, relation, near);
   if (!street_way_) return relation;
   const StreetWay::Relation street =
       street_way_->RelationOf(place_m, sigma_m * sigma_m, known.hazard.course_rad);
@@ -177,7 +236,7 @@ WayAhead::Relation DriverAlerts::RelationOf(const WayAhead& way, const Known& kn
     relation.left_m = street.left_m;
   }
   relation.probability = street.probability + by_course;
-  near.on_way = street.path > kNoChoice;
+  near.on_way = near.on_way || street.path > kNoChoice;
   near.unsure = street.path > 0 && street.path < config_.sure_above;
   return relation;
 }
@@ -212,6 +271,7 @@ std::vector<HazardAlert> DriverAlerts::Add(std::int64_t stamp_ns, const geo::Tra
   }
   if (street_way_) street_way_->Add(pose.position, sigma_m, filter_);
   if (!filter_.known()) return told;
+  Remember();
 
   const double speed = filter_.state()[CourseFilter::kSpeed];
   const double longest_s = LeadS(1, speed) + filter_.period_s();

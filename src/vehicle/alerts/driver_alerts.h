@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -17,9 +18,11 @@
 #include "geo/vehicle_pose.h"
 #include "geo/wgs84.h"
 #include "protocol/hazard_catalogue.h"
+#include "protocol/trail.h"
 #include "streets/street_map.h"
 #include "vehicle/alerts/course_filter.h"
 #include "vehicle/alerts/street_way.h"
+#include "vehicle/alerts/trail_way.h"
 #include "vehicle/alerts/way_ahead.h"
 
 namespace livemap::vehicle {
@@ -33,6 +36,7 @@ struct AlertHazard {
   std::optional<double> altitude_m;  ///< Above the ellipsoid, where known.
   /// Of a vehicle that passed it, as protocol::Notice has it.
   double course_rad = std::numeric_limits<double>::quiet_NaN();
+  std::vector<protocol::Trail> trails{};  ///< As protocol::Notice has them.
 };
 
 /// Word to the driver about one hazard.
@@ -99,6 +103,7 @@ class DriverAlerts {
     double speeding_up_mps2 = 2.4;  ///< Assumed on streets of a map below the usual speed.
     CourseFilter::Config course;
     WayAhead::Config way;
+    TrailWay::Config trails;
     StreetWay::Config streets;
   };
 
@@ -170,6 +175,9 @@ class DriverAlerts {
   double ReachOnStreetM(double time_s) const;
   WayAhead::Relation RelationOf(const WayAhead& way, const Known& known, double fix_variance_m2,
                                 Near& near) const;
+  void WeighTrails(const AlertHazard& hazard, const Eigen::Vector2d& place_m,
+                   double fix_variance_m2, WayAhead::Relation& relation, Near& near) const;
+  void Remember();
   bool OnOtherLevel(const AlertHazard& hazard, std::optional<double> altitude_m) const;
   bool IsDue(const Near& near) const;
   void Judge(const Known& known, const WayAhead::Relation& relation, double time_s, Near& near,
@@ -180,6 +188,7 @@ class DriverAlerts {
   Config config_;
   protocol::HazardCatalogue catalogue_;
   CourseFilter filter_;
+  std::deque<DrivenPlace> driven_;       // The last metres of the way, on the filter's plane.
   std::optional<StreetWay> street_way_;  // With a map of streets.
   std::optional<geo::LocalFrame> frame_;
   std::optional<std::int64_t> newest_ns_;

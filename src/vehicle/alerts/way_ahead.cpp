@@ -87,6 +87,7 @@ double WayAhead::OwnDensity(const Line& line, const Eigen::Vector2d& place_m, do
   relation.ahead = true;
   relation.way_m = nearest->way_m + beyond_m;
   relation.left_m = left_of(*nearest);
+  relation.course_rad = std::atan2(nearest->ahead.x(), nearest->ahead.y());
   const double steady_m2 =
       nearest->variance_m2 + variance_m2 + config_.lane_sigma_m * config_.lane_sigma_m;
   const double bent_m2 = steady_m2 + nearest->bend_variance_m2;

@@ -32,6 +32,7 @@ class WayAhead {
     double left_m = 0;       ///< Of the way where ahead; else of the straight line ahead.
     double forward_m = 0;    ///< Along the straight line ahead, negative behind.
     double probability = 0;  ///< That it lies on the vehicle's own way.
+    double course_rad = 0;   ///< Of the way beside the place, clockwise from north.
   };
 
   /// Predicts `way_m` metres from a filter that knows its state.

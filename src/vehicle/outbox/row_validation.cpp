@@ -24,7 +24,8 @@ constexpr char kBrokenKnown[] =
     "typeof(longitude) IN ('real', 'integer') AND longitude BETWEEN -180 AND 180 AND "
     "typeof(sequence) = 'integer' AND sequence BETWEEN 0 AND 1152921504606846975 AND "
     "typeof(news_ns) = 'integer' AND news_ns BETWEEN 0 AND 4294967294999999999 AND "
-    "(course_rad IS NULL OR (typeof(course_rad) = 'real' AND abs(course_rad) < 6.2831854)))";
+    "(course_rad IS NULL OR (typeof(course_rad) = 'real' AND abs(course_rad) < 6.2831854)) AND "
+    "(trails IS NULL OR (typeof(trails) = 'text' AND length(CAST(trails AS BLOB)) <= 1024)))";
 constexpr char kBrokenGone[] =
     "NOT (typeof(id) = 'blob' AND length(id) = 16 AND typeof(sequence) = 'integer' AND "
     "sequence BETWEEN 0 AND 1152921504606846975)";

@@ -48,6 +48,9 @@ const std::vector<std::string>& LocalHazardMapMigrations() {
       "  PRIMARY KEY(zone, cell)) WITHOUT ROWID;",
       // NULL where it is not known. Cells are asked about anew, for the courses of what is known.
       "ALTER TABLE known ADD COLUMN course_rad REAL;"
+      "DELETE FROM cells;",
+      // As protocol::TrailsText writes them; NULL where none is known. As above.
+      "ALTER TABLE known ADD COLUMN trails TEXT;"
       "DELETE FROM cells;"};
   return migrations;
 }
@@ -485,6 +488,7 @@ bool LocalHazardMap::TakeCell(const protocol::CellNews::Cell& cell, const std::s
     notice.position = hazard.position;
     notice.stamp_ns = hazard.stamp_ns;
     notice.course_rad = hazard.course_rad;
+    notice.trails = hazard.trails;
     const bool is_usable = hazard.sequence <= kMaxStoredSequence && IsUsableNotice(notice);
     const NoticeUse use =
         is_usable ? TakeHazard(notice, zone, taking.changes) : NoticeUse::kUnusable;
@@ -625,7 +629,7 @@ LocalHazardMap::NoticeUse LocalHazardMap::TakeHazard(const protocol::Notice& not
     return NoticeUse::kBeyondZone;
   }
   if (!IsNews(notice, zone)) {
-    LearnCourse(notice, zone);
+    LearnPasses(notice, zone);
     return NoticeUse::kTaken;
   }
   StoreNotice(notice, zone);
@@ -692,9 +696,30 @@ bool LocalHazardMap::IsNews(const protocol::Notice& notice, const std::string& z
          (is_removed ? sequence > query.Int(1) : sequence >= query.Int(1));
 }
 
-/// Of a hazard that is known without one: the same was told before by a message that has none.
-void LocalHazardMap::LearnCourse(const protocol::Notice& notice, const std::string& zone) {
-  if (notice.action == protocol::Notice::Action::kRemoved || std::isnan(notice.course_rad)) return;
+/// Trails as the table has them; nothing for none.
+std::optional<std::string> LocalHazardMap::StoredTrails(const protocol::Notice& notice) {
+  const std::string text =
+      protocol::TrailsText(protocol::ValidTrails(notice.trails, notice.position));
+  if (text.empty()) return std::nullopt;
+  return text;
+}
+
+/// How a hazard is passed where that was not known: the same was told before by a message that does
+/// not say it, or before the zone knew it.
+void LocalHazardMap::LearnPasses(const protocol::Notice& notice, const std::string& zone) {
+  if (notice.action == protocol::Notice::Action::kRemoved) return;
+  const auto sequence = static_cast<std::int64_t>(notice.sequence);
+  if (const auto trails = StoredTrails(notice)) {
+    database_
+        ->Prepare(
+            "UPDATE known SET trails=?1 WHERE id=?2 AND of_zone=1 AND zone=?3 AND sequence=?4")
+        .Bind(1, *trails)
+        .BindBlob(2, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size())
+        .Bind(3, zone)
+        .Bind(4, sequence)
+        .Execute();
+  }
+  if (std::isnan(notice.course_rad)) return;
   database_
       ->Prepare(
           "UPDATE known SET course_rad=?1 WHERE id=?2 AND of_zone=1 AND zone=?3 AND sequence=?4"
@@ -702,7 +727,7 @@ void LocalHazardMap::LearnCourse(const protocol::Notice& notice, const std::stri
       .Bind(1, notice.course_rad)
       .BindBlob(2, notice.hazard_uuid.bytes.data(), notice.hazard_uuid.bytes.size())
       .Bind(3, zone)
-      .Bind(4, static_cast<std::int64_t>(notice.sequence))
+      .Bind(4, sequence)
       .Execute();
 }
 
@@ -725,12 +750,14 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::stri
         .Execute();
     return;
   }
-  // A message without a course, as old zones and old topics have it, takes none away.
+  // A message without a course or trails, as old zones and old topics have it, takes none away.
   SqliteStatement upsert = database_->Prepare(
       "INSERT OR REPLACE INTO"
-      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone,course_rad)"
+      " known(id,of_zone,class_name,confidence,latitude,longitude,sequence,news_ns,zone,course_rad,"
+      "  trails)"
       " VALUES(?1,1,?2,?3,?4,?5,?6,?7,?8,"
-      " coalesce(?9,(SELECT course_rad FROM known WHERE id=?1 AND of_zone=1)))");
+      " coalesce(?9,(SELECT course_rad FROM known WHERE id=?1 AND of_zone=1)),"
+      " coalesce(?10,(SELECT trails FROM known WHERE id=?1 AND of_zone=1)))");
   upsert.BindBlob(1, id.data(), id.size())
       .Bind(2, notice.class_name)
       .Bind(3, static_cast<double>(notice.confidence))
@@ -739,8 +766,9 @@ void LocalHazardMap::StoreNotice(const protocol::Notice& notice, const std::stri
       .Bind(6, sequence)
       .Bind(7, notice.stamp_ns)
       .Bind(8, zone)
-      .Bind(9, notice.course_rad)  // SQLite takes NaN as NULL.
-      .Execute();
+      .Bind(9, notice.course_rad);  // SQLite takes NaN as NULL.
+  if (const auto trails = StoredTrails(notice)) upsert.Bind(10, *trails);
+  upsert.Execute();
 }
 
 }  // namespace livemap::vehicle

@@ -214,7 +214,8 @@ class LocalHazardMap {
   bool IsOfAnotherZone(const Uuid& hazard, const std::string& zone) const;
   bool IsNews(const protocol::Notice& notice, const std::string& zone) const;
   void StoreNotice(const protocol::Notice& notice, const std::string& zone);
-  void LearnCourse(const protocol::Notice& notice, const std::string& zone);
+  void LearnPasses(const protocol::Notice& notice, const std::string& zone);
+  static std::optional<std::string> StoredTrails(const protocol::Notice& notice);
   bool CatchUp(const protocol::Notice& notice, const std::string& zone, ZoneMemory& memory,
                std::vector<Change>& changes);
   std::vector<Uuid> NotTold(const protocol::Notice& notice, const std::string& zone,

@@ -203,6 +203,43 @@ TEST(AnnouncedHazardsTest, ACourseThatIsToldLaterIsTakenAndNoneIsTakenAway) {
   EXPECT_DOUBLE_EQ(learned.put[0].course_rad, -0.5);
 }
 
+TEST(AnnouncedHazardsTest, TrailsAreTakenWhenTheyComeAndNoneIsTakenAway) {
+  const test::TemporaryDirectory directory;
+  LocalHazardMap::Config config;
+  config.path = directory.path() + "/map.sqlite3";
+  LocalHazardMap map(config, protocol::HazardCatalogue(), 0);
+  const protocol::Notice without = NoticeOf(1, Action::kAdded, 1);
+  protocol::Notice with = without;
+  const geo::LocalFrame frame(with.position);
+  with.trails = {{frame.ToGeo({-100, 0}), frame.ToGeo({-20, 0})}};
+  protocol::Notice longer = with;
+  longer.trails[0].push_back(frame.ToGeo({200, 0}));
+  AnnouncedHazards hazards;
+  const auto places_in_map = [&] {
+    const auto stored = ReadStoredHazards(config.path);
+    std::size_t places = 0;
+    for (const auto& trail : stored->rows[0].hazard.trails) places += trail.size();
+    return places;
+  };
+  const auto hear = [&](const protocol::Notice& notice) {
+    map.Apply(std::vector<protocol::Notice>{notice});
+    return hazards.Apply(notice).put;
+  };
+  ASSERT_EQ(hear(without).size(), 1U);
+  EXPECT_EQ(places_in_map(), 0U);
+  ASSERT_EQ(hear(with).size(), 1U) << "the same announcement, with a trail";
+  EXPECT_EQ(places_in_map(), 2U);
+  EXPECT_TRUE(hear(with).empty()) << "it is known now";
+  ASSERT_EQ(hear(longer).size(), 1U) << "the zone knows more of it";
+  EXPECT_EQ(places_in_map(), 3U);
+  const auto update = hear(NoticeOf(1, Action::kUpdated, 2));
+  ASSERT_EQ(update.size(), 1U);
+  ASSERT_EQ(update[0].trails.size(), 1U) << "by a message that has none";
+  EXPECT_EQ(places_in_map(), 3U);
+  SqliteDatabase(config.path, true).Execute("UPDATE known SET trails = '2 x'");
+  EXPECT_EQ(places_in_map(), 0U) << "what cannot be read counts for none";
+}
+
 TEST(AnnouncedHazardsTest, ALocalMapFromBeforeItHadCoursesIsReadOnceItHasThem) {
   const test::TemporaryDirectory directory;
   LocalHazardMap::Config config;
@@ -212,7 +249,9 @@ TEST(AnnouncedHazardsTest, ALocalMapFromBeforeItHadCoursesIsReadOnceItHasThem) {
     map.Apply(std::vector<protocol::Notice>{NoticeOf(1, Action::kAdded, 1)});
   }
   SqliteDatabase(config.path, true)
-      .Execute("ALTER TABLE known DROP COLUMN course_rad; PRAGMA user_version=5;");
+      .Execute(
+          "ALTER TABLE known DROP COLUMN course_rad; ALTER TABLE known DROP COLUMN trails;"
+          " PRAGMA user_version=5;");
   EXPECT_FALSE(ReadStoredHazards(config.path).has_value());
   const LocalHazardMap migrated(config, protocol::HazardCatalogue(), 0);
   const auto stored = ReadStoredHazards(config.path);

@@ -172,6 +172,64 @@ TEST_F(DriverAlertsTest, FollowsABend) {
   EXPECT_EQ(StatesOf(1), (std::vector<State>{State::kApproach, State::kPassed}));
 }
 
+TEST_F(DriverAlertsTest, FollowsTheTrailOfOneWhoPassedAroundABend) {
+  // 130 m straight on, then a bend of 80 m radius to the right, on which the hazard lies.
+  const auto bend_m = [](double way_m) {
+    const double turned_rad = way_m / 80;
+    return Eigen::Vector2d(80 * (1 - std::cos(turned_rad)), 300 + 80 * std::sin(turned_rad));
+  };
+  const Eigen::Vector2d hazard_m = bend_m(70);
+  AlertHazard known{AlertedId(1), "pothole", frame_.ToGeo(hazard_m), 1.0, std::nullopt};
+  AlertHazard unknown = known;
+  unknown.id = AlertedId(2);
+  protocol::Trail trail{frame_.ToGeo({1, 80}), frame_.ToGeo({1, 300})};
+  for (double way_m = 10; way_m < 100; way_m += 10) trail.push_back(frame_.ToGeo(bend_m(way_m)));
+  known.trails = {trail};
+  ASSERT_TRUE(alerts_.Put(known));
+  ASSERT_TRUE(alerts_.Put(unknown));
+  Drive(299, 14);
+  ASSERT_EQ(StatesOf(1), std::vector<State>{State::kApproach}) << "before the bend begins";
+  EXPECT_GE(told_.front().second.time_s, 4.5);
+  EXPECT_NEAR(told_.front().second.distance_m / told_.front().second.time_s, 14, 1);
+  EXPECT_TRUE(StatesOf(2).empty()) << "nothing tells of the bend yet";
+}
+
+TEST_F(DriverAlertsTest, AnOncomingVehiclesTrailIsTheWayToo) {
+  AlertHazard hazard{AlertedId(1), "pothole", frame_.ToGeo({60, 330}), 1.0, std::nullopt};
+  hazard.trails = {{frame_.ToGeo({200, 332}), frame_.ToGeo({20, 332}), frame_.ToGeo({-3, 300}),
+                    frame_.ToGeo({-3, 50})}};
+  ASSERT_TRUE(alerts_.Put(hazard));
+  Drive(280, 6);  // As slow as for the corner to come.
+  EXPECT_EQ(StatesOf(1), std::vector<State>{});
+  Drive(20, 5.5);
+  Drive(45, 5.5, 1 / 25.0);
+  EXPECT_EQ(StatesOf(1), std::vector<State>{State::kApproach});
+}
+
+TEST_F(DriverAlertsTest, KeepsSilentWhereOthersPassedBesideTheOwnWay) {
+  // Right on the own way by its place, but all who passed it were 20 m to the side, and across.
+  AlertHazard beside{AlertedId(1), "pothole", frame_.ToGeo({5, 400}), 3.0, std::nullopt};
+  beside.trails = {{frame_.ToGeo({20, 100}), frame_.ToGeo({18, 350}), frame_.ToGeo({5, 420}),
+                    frame_.ToGeo({5, 600})}};
+  AlertHazard above{AlertedId(2), "pothole", frame_.ToGeo({1, 420}), 1.0, std::nullopt};
+  above.trails = {{frame_.ToGeo({-250, 420}), frame_.ToGeo({250, 420})}};
+  ASSERT_TRUE(alerts_.Put(beside));
+  ASSERT_TRUE(alerts_.Put(above));
+  PutHazard(3, 1, 420);
+  Drive(390, 14);
+  EXPECT_TRUE(StatesOf(2).empty());
+  EXPECT_EQ(StatesOf(3), std::vector<State>{State::kApproach}) << "without a trail it is told";
+}
+
+TEST_F(DriverAlertsTest, TrailsThatCannotBeCountForNone) {
+  AlertHazard hazard{AlertedId(1), "pothole", frame_.ToGeo({0, 400}), 1.0, std::nullopt};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  hazard.trails = {{{nan, 7}, {49, nan}}, {}, {frame_.ToGeo({9000, 0}), frame_.ToGeo({0, 9000})}};
+  ASSERT_TRUE(alerts_.Put(hazard));
+  Drive(390, 14);
+  EXPECT_EQ(StatesOf(1), std::vector<State>{State::kApproach});
+}
+
 TEST_F(DriverAlertsTest, CancelsAfterATurnOff) {
   PutHazard(1, 0, 240);
   Drive(200, 10);

@@ -69,7 +69,7 @@ inline void MakeOlder(const std::string& path) {
   }
   database.Execute(
       "ALTER TABLE pending DROP COLUMN zone; ALTER TABLE known DROP COLUMN zone;"
-      "ALTER TABLE known DROP COLUMN course_rad;"
+      "ALTER TABLE known DROP COLUMN course_rad; ALTER TABLE known DROP COLUMN trails;"
       "CREATE TABLE zone(map_sequence INTEGER NOT NULL);"
       "INSERT INTO zone SELECT coalesce(max(map_sequence), 0) FROM zones; DROP TABLE zones;"
       "DROP TABLE cells;"
