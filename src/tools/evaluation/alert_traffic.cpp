@@ -104,6 +104,8 @@ struct Lane {
   Driven driven;
   bool one_way;  // No vehicle comes the other way on the lane beside it.
   bool other_level = false;
+  std::vector<std::size_t> junctions{};  // Points at which vehicles also come in from the sides.
+  Line before{};  // One way by which vehicles come to its first point; empty: it is not drawn.
 };
 
 struct Stop {
@@ -118,6 +120,7 @@ struct Streets {
   double sideways_mps2 = 2.2;  // In bends.
   std::vector<Lane> lanes;     // All that hazards lie on, the vehicle's own included.
   std::vector<Stop> stops;
+  std::vector<std::size_t> way_junctions;    // Points of the way, behind each junction.
   std::vector<TrafficStreet> mapped;         // What a map has: middles of carriageways.
   std::vector<Eigen::Vector2d> junctions_m;  // Where those meet.
 
@@ -147,7 +150,9 @@ void GoOn(Streets& streets, SeededRandom& random, double length_m) {
 
 void AddOwnLanes(Streets& streets) {
   streets.AddLane(streets.way.line(), Driven::kAlong);
+  streets.lanes.back().junctions = streets.way_junctions;
   streets.AddLane(streets.way.Beside(kLaneM), Driven::kAgainst);
+  streets.lanes.back().junctions = streets.way_junctions;
 }
 
 /// The own street as one of the map, too.
@@ -165,6 +170,12 @@ void AddAcross(Streets& streets, double angle_rad, double half_m, bool other_lev
   pen.Straight(2 * half_m);
   streets.AddLane(pen.Beside(0.5 * kLaneM), Driven::kAgainst, other_level);
   streets.AddLane(pen.Beside(-0.5 * kLaneM), Driven::kAlong, other_level);
+  if (!other_level) {
+    for (std::size_t i = streets.lanes.size() - 2; i < streets.lanes.size(); ++i) {
+      streets.lanes[i].junctions = {streets.lanes[i].line.size() / 2};
+    }
+    streets.way_junctions.push_back(streets.way.size() - 1);
+  }
   TrafficStreet across{pen.line()};
   across.bridge = other_level;
   streets.mapped.push_back(std::move(across));
@@ -253,6 +264,11 @@ Line PartOf(const Line& line, std::size_t from, std::size_t to) {
           line.begin() + static_cast<std::ptrdiff_t>(to)};
 }
 
+Line Joined(Line first, const Line& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
 constexpr std::array<double, 3> kRoundaboutArmsRad{-80 * kDegree, 0, 90 * kDegree};
 
 /// The middle of the street from one point of the pen to its end, after `start`.
@@ -335,6 +351,7 @@ Streets MakeRoundabouts(SeededRandom& random) {
       const std::size_t from = pen.size();
       pen.Straight(200);
       streets.AddLane(PartOf(pen.line(), from, pen.size()), Driven::kAlong);
+      streets.lanes.back().before = Joined(streets.way.line(), PartOf(pen.line(), 0, from));
       streets.AddLane(pen.Beside(kLaneM, from), Driven::kAgainst);
       streets.mapped.push_back({MiddleSince(pen, from, {gate_m})});
     }
@@ -342,6 +359,7 @@ Streets MakeRoundabouts(SeededRandom& random) {
     const std::size_t exit_from = BeginOfExit(streets.way);
     start = {MapExit(streets, exits_m[taken], streets.way, exit_from)};
     street_from = streets.way.size();
+    streets.way_junctions.push_back(street_from - 1);
   }
   streets.way.Straight(150);
   streets.mapped.push_back({MiddleSince(streets.way, street_from, start)});
@@ -381,12 +399,14 @@ Streets MakeTurns(SeededRandom& random) {
       const std::size_t from = pen.size();
       pen.Straight(200);
       streets.AddLane(pen.line(), Driven::kAlong);
+      streets.lanes.back().before = streets.way.line();
       streets.AddLane(pen.Beside(kLaneM), Driven::kAgainst);
       streets.mapped.push_back({MiddleSince(pen, from, {middle_m})});
     }
     TurnAtJunction(streets.way, turns_rad[taken]);
     start = {middle_m};
     street_from = streets.way.size();
+    streets.way_junctions.push_back(street_from - 1);
   }
   streets.way.Straight(100);
   streets.mapped.push_back({MiddleSince(streets.way, street_from, start)});
@@ -498,6 +518,56 @@ double CourseBefore(const Line& line, std::size_t at, Driven driven, double befo
   return CourseAlong(line[seen_from] - line[seen_from + 1]);
 }
 
+/// How a vehicle came to a place on a lane: points of its way in driving order. At each junction it
+/// may have come from another side than the lane does.
+Line TrailTo(const Lane& lane, std::size_t at, Driven driven, SeededRandom& random) {
+  constexpr double kTrailM = 300;
+  constexpr double kFromAsideShare = 0.3;  // At a junction.
+  constexpr double kSideStreetM = 150;
+  const bool along = driven == Driven::kAlong;
+  const auto step = [&](std::size_t i) { return along ? i - 1 : i + 1; };
+  const std::size_t end = along ? 0 : lane.line.size() - 1;
+  Line backwards;
+  double length_m = 0;
+  const auto go_to = [&](const Eigen::Vector2d& place_m) {
+    if (!backwards.empty()) length_m += (place_m - backwards.back()).norm();
+    backwards.push_back(place_m);
+    return length_m < kTrailM;
+  };
+  const auto come_from = [&](const Eigen::Vector2d& ahead, double turned_rad) {
+    const double cosine = std::cos(turned_rad);
+    const double sine = std::sin(turned_rad);
+    const Eigen::Vector2d side(cosine * ahead.x() - sine * ahead.y(),
+                               sine * ahead.x() + cosine * ahead.y());
+    const Eigen::Vector2d corner_m = backwards.back();
+    for (double m = 5; m < kSideStreetM && go_to(corner_m - m * side); m += 5) continue;
+  };
+  const auto any_side = [&](int sides) {
+    return (static_cast<int>(sides * random.Uniform()) - 1) * M_PI / 2;  // -90, 90 or 0 degrees.
+  };
+  for (std::size_t i = at;; i = step(i)) {
+    if (!go_to(lane.line[i]) || i == end) break;
+    const bool is_junction =
+        std::find(lane.junctions.begin(), lane.junctions.end(), i) != lane.junctions.end();
+    if (is_junction && Happens(random, kFromAsideShare)) {
+      const Eigen::Vector2d ahead = (lane.line[i] - lane.line[step(i)]).normalized();
+      come_from(ahead, Happens(random, 0.5) ? M_PI / 2 : -M_PI / 2);
+      length_m = kTrailM;
+      break;
+    }
+  }
+  if (length_m < kTrailM && along && !lane.before.empty()) {
+    if (Happens(random, 1 / 3.0)) {
+      for (auto place = lane.before.rbegin(); place != lane.before.rend(); ++place) {
+        if (!go_to(*place)) break;
+      }
+    } else {
+      come_from((lane.line[1] - lane.line[0]).normalized(), any_side(3));
+    }
+  }
+  return {backwards.rbegin(), backwards.rend()};
+}
+
 /// How vehicles that see the hazards drive.
 void AddCourses(const Lane& lane, std::size_t at, TrafficHazard& hazard, SeededRandom& random) {
   constexpr double kSeenFromLeastM = 8;
@@ -509,8 +579,27 @@ void AddCourses(const Lane& lane, std::size_t at, TrafficHazard& hazard, SeededR
                                             : CourseBefore(lane.line, at, oncoming, before_m);
 }
 
+/// How a vehicle that drives the lane along or against its points passes the place.
+Line TrailPast(const Lane& lane, std::size_t at, Driven driven, SeededRandom& random) {
+  const Driven back = driven == Driven::kAlong ? Driven::kAgainst : Driven::kAlong;
+  Line trail = TrailTo(lane, at, driven, random);
+  const Line after = TrailTo(lane, at, back, random);
+  trail.insert(trail.end(), std::next(after.rbegin()), after.rend());
+  return trail;
+}
+
+void AddTrails(const Lane& lane, std::size_t at, TrafficHazard& hazard, SeededRandom& random) {
+  constexpr std::size_t kVehicles = 3;
+  const Driven oncoming = lane.driven == Driven::kAlong ? Driven::kAgainst : Driven::kAlong;
+  for (std::size_t i = 0; i < kVehicles; ++i) {
+    hazard.trails_m.push_back(TrailPast(lane, at, lane.driven, random));
+    if (!lane.one_way) hazard.oncoming_trails_m.push_back(TrailPast(lane, at, oncoming, random));
+  }
+}
+
 std::vector<TrafficHazard> ScatterHazards(const Streets& streets, double per_km,
-                                          SeededRandom& random, SeededRandom& sights) {
+                                          SeededRandom& random, SeededRandom& sights,
+                                          SeededRandom& trails) {
   constexpr double kAsideM = 0.4;
   const std::array<const char*, 3> classes{"pothole", "traffic_cone", "debris"};
   std::vector<TrafficHazard> hazards;
@@ -524,6 +613,7 @@ std::vector<TrafficHazard> ScatterHazards(const Streets& streets, double per_km,
         hazards.push_back(
             {lane.line[i] + kAsideM * random.Normal(), lane.other_level, classes.at(chosen)});
         AddCourses(lane, i, hazards.back(), sights);
+        AddTrails(lane, i, hazards.back(), trails);
         next_m += random.Exponential(1000 / per_km);
       }
     }
@@ -554,7 +644,8 @@ TrafficDrive MakeTrafficDrive(const std::string& scenario, double per_km, std::u
   drive.way_m = streets.way.line();
   drive.moments = DriveAlong(streets, random);
   SeededRandom sights(seed * 1000003 + number + 1000);  // So that all else stays as it was.
-  drive.hazards = ScatterHazards(streets, per_km, random, sights);
+  SeededRandom trails(seed * 1000003 + number + 2000);
+  drive.hazards = ScatterHazards(streets, per_km, random, sights, trails);
   drive.streets = streets.mapped;
   drive.junctions_m = streets.junctions_m;
   return drive;

@@ -19,6 +19,10 @@ struct TrafficHazard {
   double course_rad = 0;
   /// The same on the oncoming lane; NaN where the street is driven in one direction.
   double oncoming_course_rad = 0;
+  /// How vehicles on its lane passed it: up to 300 m before and behind it, in driving order.
+  std::vector<std::vector<Eigen::Vector2d>> trails_m{};
+  /// The same on the oncoming lane; empty where the street is driven in one direction.
+  std::vector<std::vector<Eigen::Vector2d>> oncoming_trails_m{};
 };
 
 /// Where the vehicle truly is at one moment.

@@ -76,6 +76,18 @@ double ToldCourse(const TrafficDrive& drive, const TrafficHazard& hazard,
   return std::remainder(course_rad + noise_rad, 2 * M_PI);
 }
 
+/// How fast vehicles drive at a point of a line that has one every metre or five.
+double CornerSpeedMps(const std::vector<Eigen::Vector2d>& line_m, std::size_t at) {
+  constexpr double kSideways = 2.2;
+  if (at < 4 || at + 4 >= line_m.size()) return 30;
+  const Eigen::Vector2d in = line_m[at] - line_m[at - 4];
+  const Eigen::Vector2d out = line_m[at + 4] - line_m[at];
+  const double sine = in.x() * out.y() - in.y() * out.x();
+  const double turn_rad = std::abs(std::atan2(sine, in.dot(out)));
+  const double way_m = 0.5 * (in.norm() + out.norm());
+  return std::max(4.0, std::sqrt(kSideways * way_m / std::max(1e-6, turn_rad)));
+}
+
 /// What the driver is told on a drive.
 class AlertRun {
  public:
@@ -87,12 +99,14 @@ class AlertRun {
         alerts_(config, catalogue, MapOf(drive, trial)) {
     datasets::SeededRandom random(trial.seed * 7919 + 1);
     datasets::SeededRandom courses(trial.seed * 7919 + 5);
+    datasets::SeededRandom trails(trial.seed * 7919 + 6);
     for (std::size_t i = 0; i < drive.hazards.size(); ++i) {
       const Eigen::Vector2d told_m =
           drive.hazards[i].place_m + trial.place_sigma_m * random.Normal();
       alerts_.Put({IdOfHazard(i), drive.hazards[i].class_name, frame_.ToGeo(told_m),
                    trial.place_sigma_m, std::nullopt,
-                   ToldCourse(drive, drive.hazards[i], trial.course_errors, courses)});
+                   ToldCourse(drive, drive.hazards[i], trial.course_errors, courses),
+                   ToldTrails(drive.hazards[i], trial.trail_errors, trails)});
     }
   }
 
@@ -126,6 +140,34 @@ class AlertRun {
   }
 
  private:
+  /// How vehicles passed the hazard, as the zone tells it: their positions once a second.
+  std::vector<protocol::Trail> ToldTrails(const TrafficHazard& hazard, const TrailErrors& errors,
+                                          datasets::SeededRandom& random) const {
+    std::vector<protocol::Trail> told;
+    for (std::size_t i = 0; i < hazard.trails_m.size(); ++i) {
+      const bool is_none = random.Uniform() < errors.none_share;
+      const bool is_oncoming = random.Uniform() < errors.oncoming_share;
+      const double usual_mps = 8 + 6 * random.Uniform();
+      const Eigen::Vector2d bias_m = errors.bias_m * random.Normal();
+      const auto& true_m = is_oncoming && !hazard.oncoming_trails_m.empty()
+                               ? hazard.oncoming_trails_m[i]
+                               : hazard.trails_m[i];
+      protocol::Trail trail;
+      double left_m = 0;
+      for (std::size_t k = true_m.size(); k-- > 0;) {
+        if (k + 1 < true_m.size()) left_m -= (true_m[k + 1] - true_m[k]).norm();
+        if (left_m > 0) continue;
+        left_m += std::min(usual_mps, CornerSpeedMps(true_m, k));  // Of one second.
+        trail.push_back(frame_.ToGeo(true_m[k] + bias_m + errors.scatter_m * random.Normal()));
+      }
+      std::reverse(trail.begin(), trail.end());
+      if (!is_none && i < errors.trails && trail.size() > 1) {
+        told.push_back(protocol::SimplifiedTrail(trail));
+      }
+    }
+    return told;
+  }
+
   std::shared_ptr<const streets::StreetMap> MapOf(const TrafficDrive& drive,
                                                   const AlertTrial& trial) const {
     if (!trial.streets) return nullptr;

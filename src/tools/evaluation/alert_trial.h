@@ -27,6 +27,15 @@ struct CourseErrors {
 
 constexpr double kAtJunctionM = 20;
 
+/// How the zone knows how vehicles passed the hazards.
+struct TrailErrors {
+  double none_share = 0.15;     ///< Of the vehicles: the zone knows no trail.
+  std::size_t trails = 2;       ///< Vehicles of one hazard, 0 to 3.
+  double bias_m = 1.5;          ///< Of a trail as a whole, standard deviation per axis, m.
+  double scatter_m = 0.4;       ///< Of each of its places, the same.
+  double oncoming_share = 0.2;  ///< As CourseErrors::oncoming_share, of trails.
+};
+
 /// What the vehicle is given of the simulated world.
 struct AlertTrial {
   /// Of the receiver: white and slow errors, losses of the fix.
@@ -40,6 +49,7 @@ struct AlertTrial {
   bool streets = false;  ///< The vehicle has a map of the streets, with these errors.
   StreetMapErrors map_errors;
   CourseErrors course_errors;
+  TrailErrors trail_errors;
 };
 
 /// docs/reference/measures.md defines the figures.

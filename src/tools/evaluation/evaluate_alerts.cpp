@@ -109,6 +109,10 @@ int EvaluateAlerts(int argc, char** argv) {
        {"oncoming-share", "X",
         "share of the hazards on streets driven in both directions that a vehicle on the oncoming\n"
         "lane has reported, default 0.2"},
+       {"trails", "N",
+        "vehicles of each hazard whose trails past it the zone tells, default 2; 0 to 3"},
+       {"no-trail-share", "X",
+        "share of these vehicles of which the zone knows no trail, default 0.15"},
        {"hazards", "FILE", "catalogue of hazard classes; default: every class has rank 2"}});
   if (!line.Parse(argc, argv)) return 0;
   const std::vector<std::string> scenarios = ChosenScenarios(line.Text("scenario", ""));
@@ -128,6 +132,12 @@ int EvaluateAlerts(int argc, char** argv) {
   courses.none_share = line.Number("no-course-share", courses.none_share, 0, 1);
   courses.wrong_share = line.Number("wrong-course-share", courses.wrong_share, 0, 1);
   courses.oncoming_share = line.Number("oncoming-share", courses.oncoming_share, 0, 1);
+  TrailErrors& trails = trial.trail_errors;
+  trails.trails = static_cast<std::size_t>(line.Whole("trails", 2, 0, 3));
+  trails.none_share = line.Number("no-trail-share", trails.none_share, 0, 1);
+  trails.bias_m = trial.receiver.bias_sigma_m;
+  trails.scatter_m = trial.receiver.white_sigma_m;
+  trails.oncoming_share = courses.oncoming_share;
   const std::string hazards = line.Text("hazards", "");
   const protocol::HazardCatalogue catalogue =
       hazards.empty() ? protocol::HazardCatalogue() : protocol::HazardCatalogue::Load(hazards);
