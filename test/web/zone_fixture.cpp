@@ -10,7 +10,8 @@
 namespace livemap::web {
 
 TokenFile::TokenFile() {
-  std::ofstream(path()) << official() << " " << token() << "\n";
+  std::ofstream(path()) << official() << " " << token() << "\n"
+                        << region() << " " << region_token() << " speaks-for-others\n";
   if (chmod(path().c_str(), 0600) != 0) throw Error("chmod failed for '" + path() + "'");
 }
 

@@ -31,13 +31,16 @@ class TemporaryFolder {
   std::string path_;
 };
 
-/// A token file that only its owner may read, with one official.
+/// A token file that only its owner may read, with one official and one region, which may speak for
+/// others.
 class TokenFile {
  public:
   TokenFile();
   std::string path() const { return folder_.path() + "/tokens"; }
   static std::string official() { return "miller"; }
   static std::string token() { return "correct-horse-battery-staple"; }
+  static std::string region() { return "metro"; }
+  static std::string region_token() { return "staple-battery-horse-correct"; }
 
  private:
   TemporaryFolder folder_;

@@ -6,6 +6,7 @@
 #include "common/clock.h"
 #include "common/sha256.h"
 #include "common/time.h"
+#include "protocol/text_rules.h"
 #include "web/http/cookie.h"
 #include "web/http/origin.h"
 #include "web/http/request_body.h"
@@ -73,6 +74,27 @@ class Turn {
   std::atomic_flag& flag_;
   const bool is_mine_;
 };
+
+/// Puts whom the request names before the token's owner; else the refusal.
+std::optional<HttpResponse> SpeakFor(const std::string& other, bool may_speak,
+                                     std::string& official) {
+  if (!may_speak) {
+    return MakeErrorAnswer(
+        403, std::string("X-LiveMap-On-Behalf-Of names somebody, accepted is that from a token "
+                         "alone behind which the token file has the word ") +
+                 kSpeaksForOthers);
+  }
+  std::string name = other + " at " + official;
+  if (!protocol::IsAcceptableName(other, kMaxOfficialBytes) || name.size() > kMaxOfficialBytes) {
+    return MakeErrorAnswer(400,
+                           "X-LiveMap-On-Behalf-Of is not accepted, accepted is a printable "
+                           "name that has with ' at " +
+                               official + "' at most " + std::to_string(kMaxOfficialBytes) +
+                               " bytes");
+  }
+  official = std::move(name);
+  return std::nullopt;
+}
 
 }  // namespace
 
@@ -153,14 +175,17 @@ std::optional<HttpResponse> Access::WhyNotOfficial(const HttpRequest& question,
       return MakeErrorAnswer(403, "a viewer may not decide anything");
     }
     official = person->name;
-    return std::nullopt;
+    return question.on_behalf_of.empty() ? std::nullopt
+                                         : SpeakFor(question.on_behalf_of, false, official);
   }
   OfficialAuthenticator::Answer answer =
       authenticator_.Check(question.authorization, question.client, Seconds(SteadyNs()));
   switch (answer.verdict) {
     case OfficialAuthenticator::Verdict::kAllowed:
       official = std::move(answer.official);
-      return std::nullopt;
+      return question.on_behalf_of.empty()
+                 ? std::nullopt
+                 : SpeakFor(question.on_behalf_of, answer.speaks_for_others, official);
     case OfficialAuthenticator::Verdict::kClosed:
       if (HasAccounts()) return Unauthorized("log in to decide anything");
       return MakeErrorAnswer(403,

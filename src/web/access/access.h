@@ -38,7 +38,10 @@ class Access {
   bool CheckOfficial(const HttpRequest& question);
   /// What whoever asks may see. Quick.
   Visibility VisibilityFor(const HttpRequest& question) const;
-  /// None where the request may decide something in the name of `official`, else the refusal.
+  /// None where the request may decide something in the name of `official`, else the refusal. By a
+  /// token that speaks for others the official is "NAME at OWNER": whom the request names in
+  /// X-LiveMap-On-Behalf-Of, and whose the token is. Any other request that names somebody is
+  /// refused.
   std::optional<HttpResponse> WhyNotOfficial(const HttpRequest& question, std::string& official);
 
   /// None where the request may do in the name of `admin` what is about the zone itself, else the
@@ -96,6 +99,10 @@ class Access {
   KeyedTokenBuckets<1> attempts_ GUARDED_BY(mutex_);
   ConfirmedSessions confirmed_ GUARDED_BY(mutex_){kConfirmedS};
 };
+
+/// An official's name has at most so many bytes, also with " at " and the owner of a token that
+/// speaks for others.
+constexpr std::size_t kMaxOfficialBytes = 64;
 
 /// Status 429, to be asked again in a minute.
 HttpResponse TooMany(const std::string& sentence);

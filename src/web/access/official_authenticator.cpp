@@ -44,19 +44,24 @@ bool EqualInConstantTime(const std::string& a, const std::string& b) {
   return difference == 0;
 }
 
-/// Throws Error for anything but "NAME TOKEN".
+/// Throws Error for anything but "NAME TOKEN" and "NAME TOKEN speaks-for-others".
 Official ParseOfficial(std::string_view line, const std::string& where) {
   const std::size_t blank = line.find(' ');
   const std::string name(line.substr(0, blank));
-  const std::string_view token =
+  std::string_view token =
       blank == std::string_view::npos ? std::string_view() : line.substr(blank + 1);
+  const std::size_t end = token.find(' ');
+  const bool speaks = end != std::string_view::npos && token.substr(end + 1) == kSpeaksForOthers;
+  // Anything else behind it stays, and is refused as no token.
+  if (speaks) token = token.substr(0, end);
   if (!protocol::IsAcceptableName(name, kMaxNameBytes) || !IsToken(token)) {
     throw Error(where + " is not accepted, accepted is NAME TOKEN: a name of 1 to " +
                 std::to_string(kMaxNameBytes) + " bytes, one blank, a token of " +
                 std::to_string(kMinTokenBytes) + " to " + std::to_string(kMaxTokenBytes) +
-                " letters, digits and -._~+/=");
+                " letters, digits and -._~+/=, and behind one blank the word " + kSpeaksForOthers +
+                " where it may speak for others");
   }
-  return {name, Sha256Hex(std::string(token))};
+  return {name, Sha256Hex(std::string(token)), speaks};
 }
 
 /// The token of "Bearer TOKEN", the scheme in any case; empty for anything else.
@@ -121,36 +126,37 @@ OfficialAuthenticator::OfficialAuthenticator(std::vector<Official> officials)
 OfficialAuthenticator::Answer OfficialAuthenticator::Check(const std::string& authorization,
                                                            const std::string& client,
                                                            double now_s) {
-  if (officials_.empty()) return {Verdict::kClosed, ""};
+  if (officials_.empty()) return {Verdict::kClosed, "", false};
   const std::string token = BearerToken(authorization);
-  if (token.empty()) return {Verdict::kNoToken, ""};
+  if (token.empty()) return {Verdict::kNoToken, "", false};
   const std::int64_t now_ns = Nanoseconds(now_s);
   const bool may_try = MayTry(client, now_ns);
-  if (const auto name = Recognize(token, may_try)) return {Verdict::kAllowed, *name};
-  if (!may_try) return {Verdict::kTooManyWrong, ""};
+  if (const Official* const owner = Recognize(token, may_try)) {
+    return {Verdict::kAllowed, owner->name, owner->speaks_for_others};
+  }
+  if (!may_try) return {Verdict::kTooManyWrong, "", false};
   CountMistake(client, now_ns);
-  return {Verdict::kWrongToken, ""};
+  return {Verdict::kWrongToken, "", false};
 }
 
-std::optional<std::string> OfficialAuthenticator::Recognize(const std::string& token,
-                                                            bool may_try) const {
-  return may_try || token.size() >= kUnguessableBytes ? NameOf(token) : std::nullopt;
+const Official* OfficialAuthenticator::Recognize(const std::string& token, bool may_try) const {
+  return may_try || token.size() >= kUnguessableBytes ? OwnerOf(token) : nullptr;
 }
 
 /// Compares hashes, which tell nothing of how much of a token was right, with every official's.
-std::optional<std::string> OfficialAuthenticator::NameOf(const std::string& token) const {
+const Official* OfficialAuthenticator::OwnerOf(const std::string& token) const {
   const std::string hash = Sha256Hex(token);
   const Official* found = nullptr;
   for (const Official& official : officials_) {
     if (EqualInConstantTime(hash, official.token_sha256)) found = &official;
   }
-  return found == nullptr ? std::nullopt : std::optional<std::string>(found->name);
+  return found;
 }
 
 bool OfficialAuthenticator::IsRight(const std::string& authorization, const std::string& client,
                                     double now_s) const {
   const std::string token = BearerToken(authorization);
-  return !token.empty() && Recognize(token, MayTry(client, Nanoseconds(now_s))).has_value();
+  return !token.empty() && Recognize(token, MayTry(client, Nanoseconds(now_s))) != nullptr;
 }
 
 bool OfficialAuthenticator::MayTry(const std::string& client, std::int64_t now_ns) const {

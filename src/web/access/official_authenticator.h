@@ -14,13 +14,18 @@ namespace livemap::web {
 /// An official as the token file names him: only the token's hash is kept.
 struct Official {
   std::string name;
-  std::string token_sha256;  ///< 64 hex digits.
+  std::string token_sha256;        ///< 64 hex digits.
+  bool speaks_for_others = false;  ///< A region's: its own officials decide by it.
 };
 
-/// Reads a token file: a line "NAME TOKEN" for each official, empty lines and lines that start with
-/// '#' aside. A name is printable text of at most 64 bytes without blanks; a token is 16 to 256 of
-/// the characters that RFC 6750 allows (letters, digits, -._~+/=). Throws Error naming the line and
-/// what is accepted, and for names or tokens that come twice; never shows a token.
+/// The word behind a token that may speak for others.
+constexpr const char* kSpeaksForOthers = "speaks-for-others";
+
+/// Reads a token file: a line "NAME TOKEN" or "NAME TOKEN speaks-for-others" for each official,
+/// empty lines and lines that start with '#' aside. A name is printable text of at most 64 bytes
+/// without blanks; a token is 16 to 256 of the characters that RFC 6750 allows (letters, digits,
+/// -._~+/=). Throws Error naming the line and what is accepted, and for names or tokens that come
+/// twice; never shows a token.
 std::vector<Official> ParseTokenFile(const std::string& text, const std::string& name);
 
 /// Reads the file at `path`. Throws Error as ParseTokenFile, and when the file cannot be read, is
@@ -43,7 +48,8 @@ class OfficialAuthenticator {
   };
   struct Answer {
     Verdict verdict = Verdict::kClosed;
-    std::string official;  ///< Name, where allowed.
+    std::string official;            ///< Name, where allowed.
+    bool speaks_for_others = false;  ///< As the token file says, where allowed.
   };
 
   /// A client may be wrong so often at once, and again each time so long has passed.
@@ -63,9 +69,9 @@ class OfficialAuthenticator {
   bool IsRight(const std::string& authorization, const std::string& client, double now_s) const;
 
  private:
-  std::optional<std::string> NameOf(const std::string& token) const;
-  /// Whose token it is; none where it is wrong or not looked at.
-  std::optional<std::string> Recognize(const std::string& token, bool may_try) const;
+  const Official* OwnerOf(const std::string& token) const;
+  /// Whose token it is; null where it is wrong or not looked at.
+  const Official* Recognize(const std::string& token, bool may_try) const;
   bool MayTry(const std::string& client, std::int64_t now_ns) const;
   void CountMistake(const std::string& client, std::int64_t now_ns);
 

@@ -19,7 +19,8 @@ struct HttpRequest {
   std::string authorization;
   std::string content_type;
   std::string cookie;
-  std::string csrf_token;  ///< Of the X-CSRF-Token header.
+  std::string csrf_token;    ///< Of the X-CSRF-Token header.
+  std::string on_behalf_of;  ///< Of the X-LiveMap-On-Behalf-Of header: for whom a program asks.
   std::string origin;
   std::string host;
   std::string client;  ///< Whom wrong tokens are counted against: an address or its network.

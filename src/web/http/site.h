@@ -34,6 +34,10 @@ class Site {
   virtual bool AnswersLater(const HttpRequest& question) const = 0;
   /// Answers any request, now or later. `done` is dropped without a call when the site goes away.
   virtual void Answer(const HttpRequest& question, const Done& done) = 0;
+  /// What is answered in place of one that did not come in time (WebConfig::picture_timeout_s).
+  virtual HttpResponse LateAnswer() const {
+    return MakeBusyAnswer("the picture is not made yet", 2);
+  }
   /// Whether the request is an official's. Quick.
   virtual bool IsByOfficial(const HttpRequest& question) const = 0;
   /// What whoever asks may see. Quick.

@@ -206,6 +206,7 @@ HttpRequest HttpSession::Question(const Request& request) const {
   question.content_type = Field(request, http::field::content_type);
   question.cookie = Field(request, http::field::cookie);
   question.csrf_token = std::string(request["X-CSRF-Token"]);
+  question.on_behalf_of = std::string(request["X-LiveMap-On-Behalf-Of"]);
   question.origin = Field(request, http::field::origin);
   question.host = Field(request, http::field::host);
   question.client = client_;
@@ -246,14 +247,16 @@ void HttpSession::AwaitAnswer(const HttpRequest& question) {
     if (number != self->question_) return;
     ++self->question_;
     self->deadline_.cancel();
+    if (answer.by_official) self->context().table.MakeOfficial(self->slot_.id());
     const bool may_be_served = self->context().table.MayServe(self->slot_.id());
     self->Begin(may_be_served ? std::move(answer) : MakeBusyAnswer(kNoPlace));
     self->WritePart();
   };
   deadline_.expires_after(Milliseconds(context().options.picture_timeout_s));
-  deadline_.async_wait([serve, number = question_](beast::error_code failure) {
-    if (!failure) serve(number, MakeBusyAnswer("the picture is not made yet", 2));
-  });
+  deadline_.async_wait(
+      [serve, number = question_, late = context().site.LateAnswer()](beast::error_code failure) {
+        if (!failure) serve(number, late);
+      });
   context().site.Answer(question, [serve, number = question_,
                                    executor = stream_.get_executor()](HttpResponse answer) {
     boost::asio::post(executor, [serve, number, answer = std::move(answer)]() mutable {

@@ -158,6 +158,44 @@ TEST_F(AccessTest, WithoutTheSessionsOwnCsrfTokenNothingIsDecided) {
   EXPECT_EQ(Reject(hazard, browser.ThatDecides()).status, 200);
 }
 
+TEST_F(AccessTest, ATokenThatSpeaksForOthersDecidesInTheNameThatItGives) {
+  const std::string hazard = Add();
+  const auto reject = [&](const std::string& id, const std::string& token,
+                          const std::string& name) {
+    return Reject(id, {{"Authorization", "Bearer " + token},
+                       {"Content-Type", "application/json"},
+                       {"X-LiveMap-On-Behalf-Of", name}});
+  };
+  const std::string region = TokenFile::region_token();
+  const HttpResult refused = reject(hazard, TokenFile::token(), "alice");
+  EXPECT_EQ(refused.status, 403);
+  EXPECT_THAT(refused.body, HasSubstr("speaks-for-others"));
+  // With " at metro" it has 65 bytes.
+  EXPECT_EQ(reject(hazard, region, std::string(56, 'a')).status, 400);
+  // A tab, no UTF-8, a text that runs backwards, a control character of Latin-1, no width.
+  for (const char* hostile : {"a\tb", "\xff\xfe",
+                              "\xe2\x80\xae"
+                              "ecila",
+                              "\xc2\x85", "\xe2\x80\x8b"}) {
+    const HttpResult answer = reject(hazard, region, hostile);
+    EXPECT_EQ(answer.status, 400) << hostile;
+    EXPECT_THAT(answer.body, HasSubstr("accepted is a printable name"));
+  }
+  EXPECT_TRUE(fixture_.zone->Decisions(UINT64_MAX, 10).empty());
+  EXPECT_EQ(reject(hazard, region, "J\xc3\xbcrgen").status, 200);
+  EXPECT_EQ(fixture_.zone->Decisions(UINT64_MAX, 1).at(0).official, "J\xc3\xbcrgen at metro");
+  EXPECT_EQ(reject(Add("debris"), region, std::string(55, 'a')).status, 200);
+  EXPECT_EQ(fixture_.zone->Decisions(UINT64_MAX, 1).at(0).official.size(), 64U);
+}
+
+TEST_F(AccessTest, WhoHasLoggedInSpeaksForNobodyElse) {
+  const std::string hazard = Add();
+  Headers headers = LogIn("miller").ThatDecides();
+  headers.emplace_back("X-LiveMap-On-Behalf-Of", "root");
+  EXPECT_EQ(Reject(hazard, headers).status, 403);
+  EXPECT_TRUE(fixture_.zone->Decisions(UINT64_MAX, 10).empty());
+}
+
 TEST_F(AccessTest, WhatChangesNothingNeedsNoCsrfToken) {
   Add();
   const Browser browser = LogIn("miller");

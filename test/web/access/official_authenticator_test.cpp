@@ -50,6 +50,18 @@ TEST(ParseTokenFile, NamesTheBadLineAndNeverShowsAToken) {
   }
 }
 
+TEST(ParseTokenFile, ATokenSpeaksForOthersWhereTheWordStandsBehindIt) {
+  const auto officials =
+      ParseTokenFile("miller " + kToken + "\nmetro " + kOther + " speaks-for-others", "tokens");
+  ASSERT_EQ(officials.size(), 2U);
+  EXPECT_FALSE(officials[0].speaks_for_others);
+  EXPECT_TRUE(officials[1].speaks_for_others);
+  for (const char* word :
+       {"speaks", "speaks-for-others x", " speaks-for-others", "SPEAKS-FOR-OTHERS"}) {
+    EXPECT_THROW(ParseTokenFile("metro " + kOther + ' ' + word, "tokens"), Error) << word;
+  }
+}
+
 TEST(ParseTokenFile, RefusesNobodyAndTheSameTwice) {
   EXPECT_THAT([] { ParseTokenFile("# nobody\n", "tokens"); },
               ThrowsMessage<Error>(HasSubstr("names nobody")));

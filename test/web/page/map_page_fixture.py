@@ -42,6 +42,7 @@ class ZoneProcess:
         self.process = process or self.launch(*arguments)
         started = self.read()
         self.port, self.token = started["port"], started.get("token")
+        self.region_token = started.get("region_token")  # It speaks for others.
         self.url = f"http://127.0.0.1:{self.port}/"
 
     def read(self):

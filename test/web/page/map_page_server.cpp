@@ -403,7 +403,9 @@ int main(int argc, char** argv) {
     const auto argument = [&](int i) { return std::string(argc > i ? argv[i] : ""); };
     Session session(std::move(streets), argument(2), argument(3), argument(4), argument(5),
                     argument(6));
-    std::cout << Json{{"port", session.port()}, {"token", livemap::web::TokenFile::token()}}
+    std::cout << Json{{"port", session.port()},
+                      {"token", livemap::web::TokenFile::token()},
+                      {"region_token", livemap::web::TokenFile::region_token()}}
               << std::endl;
     std::string line;
     while (std::getline(std::cin, line)) {
