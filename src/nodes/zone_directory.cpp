@@ -33,10 +33,12 @@ constexpr char kDirectoryHelp[] =
     R"(usage: ./livemap zone directory make FILE... --out FILE      (has --help)
        ./livemap zone directory show FILE --authority CA [--at LATITUDE LONGITUDE]
        ./livemap zone directory check FILE [--max-overlap-m METRES]
+       ./livemap zone directory split FILE --zone ID --parts N --out FILE   (has --help)
 
 make   signs the zones of GeoJSON files by the authority of this machine.
 show   verifies a signed directory and lists its zones; with --at the zone that serves a place.
 check  reads a directory's text before it is signed, and refuses one whose zones overlap too far.
+split  cuts one zone of a directory's text into parts, each a zone of its own.
 
   --authority CA           the authority's certificate, ca.pem of any identity's folder
   --at LATITUDE LONGITUDE  degrees of WGS84
@@ -91,7 +93,8 @@ DirectoryArguments ParseDirectoryArguments(const std::vector<std::string>& words
     }
   }
   if (arguments.command != "show" && arguments.command != "check") {
-    throw Error("'" + arguments.command + "' is not accepted, accepted are make, show and check");
+    throw Error("'" + arguments.command +
+                "' is not accepted, accepted are make, show, check and split");
   }
   if (arguments.file.empty()) throw Error("no file was given (see --help)");
   if (arguments.command == "show" && arguments.authority.empty()) {
