@@ -1,9 +1,10 @@
-// livemap region: many zones as one map that can only be read.
+// livemap region: many zones as one map.
 #include <pthread.h>
 
 #include <charconv>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -28,16 +29,20 @@ namespace {
 constexpr char kRegionHelp[] =
     R"(usage: ./livemap region --zone NAME=URL... [--directory FILE --authority CA] [FLAGS]
 
-Serves the hazards of many zones as one map that can only be read, with the open feeds. It follows
-each zone's log, and shows a zone that is down with its last state, which it keeps on disk.
-docs/how-to/run-a-region.md has all of it.
+Serves the hazards of many zones as one map, with the open feeds. It follows each zone's log, and
+shows a zone that is down with its last state, which it keeps on disk. Without accounts it can only be
+read; with them officials log in, and decide by way of the zones. docs/how-to/run-a-region.md has all
+of it.
 
   --zone NAME=URL          a zone and the address of its live map, such as north=https://north.example;
                            once for each zone
   --directory FILE         the signed directory of the zones: their areas, names and addresses
   --authority CA           the certificate of the authority that signed it, ca.pem of an identity's folder
   --token NAME=FILE        a file (mode 0600) with an official's bearer token for a zone that does not
-                           show its hazards to everybody; once for each such zone
+                           show its hazards to everybody, or in which the region's officials decide;
+                           once for each such zone
+  --accounts DIR           folder of the region's own accounts (livemap zone user --directory DIR):
+                           officials log in here, see candidates, and decide (default: nobody does)
   --ca FILE                certificates that are trusted for https (default: the system's)
   --store DIR              folder of the last states (default ~/.livemap/region)
   --ask-every-s SECONDS    between two questions to a zone, 0.1 to 3600 (default 2)
@@ -63,6 +68,7 @@ struct RegionArguments {
   std::string directory;
   std::string authority;
   std::string catalogue;
+  std::string accounts;
   region::Region::Config region;
   web::WebConfig web;
 };
@@ -133,6 +139,8 @@ void TakeRegionFlag(const std::string& flag, const std::string& value, RegionArg
     arguments.directory = value;
   } else if (flag == "--authority") {
     arguments.authority = value;
+  } else if (flag == "--accounts") {
+    arguments.accounts = value;
   } else if (flag == "--ca") {
     arguments.region.ca_file = value;
   } else if (flag == "--store") {
@@ -199,6 +207,20 @@ void SayLine(const std::string& line) {
   std::cerr << Rfc3339Seconds(SystemNs()) << " livemap region: " << line << std::endl;
 }
 
+/// Officials see candidates, so these are followed.
+void TakeAccounts(RegionArguments& arguments) {
+  // Not made: what was mistyped would look like a region without accounts.
+  if (!std::filesystem::is_directory(arguments.accounts)) {
+    throw Error("--accounts is '" + arguments.accounts + "', accepted is a folder that there is");
+  }
+  arguments.web.accounts_file = arguments.accounts + "/accounts.sqlite";
+  for (region::RegionZone& zone : arguments.region.zones) {
+    zone.with_candidates = true;
+    if (!zone.token.empty()) continue;
+    SayLine("zone '" + zone.id + "' has no --token: the region's officials cannot decide there");
+  }
+}
+
 void Serve(RegionArguments arguments) {
   // Before there are threads: they inherit it, and the signal waits for sigwait.
   sigset_t ends;
@@ -211,6 +233,7 @@ void Serve(RegionArguments arguments) {
                              ? protocol::HazardCatalogue()
                              : protocol::HazardCatalogue::Load(arguments.catalogue);
   arguments.region.zones = region::ZonesOf(arguments.list, ReadDirectory(arguments).get());
+  if (!arguments.accounts.empty()) TakeAccounts(arguments);
   web::Validate(arguments.web);
   region::Region region(arguments.region, catalogue, SystemNs, SayLine);
   const region::RegionServer server(arguments.web, region, catalogue);

@@ -52,6 +52,7 @@ class Region {
   const RegionMap& map() const { return *map_; }
   std::int64_t NowNs() const { return now_ns_(); }
 
+  const Config& config() const { return config_; }
   std::size_t zones() const { return followed_.size(); }
   const RegionZone& zone(std::size_t index) const { return followed_[index]->follower->zone(); }
   ZoneStatus status(std::size_t index) const { return followed_[index]->follower->status(); }

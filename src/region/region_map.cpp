@@ -87,28 +87,71 @@ void RegionMap::Put(const std::string& zone, const ToldHazard& told) {
     return;
   }
   const PlacedHazard placed{hazard.uuid, hazard.class_name, hazard.position};
-  told_[hazard.uuid] = std::move(shown);
+  const bool is_candidate = hazard.state == zone::HazardState::kCandidate;
+  CountCandidate(zone, placed.id, is_candidate);
+  told_[placed.id] = std::move(shown);
   Duplicates::Changes changes;
-  duplicates_.Put(placed, zone, changes);
-  Show(changes);
-  HideUnshown(placed.id);
+  if (is_candidate) {
+    duplicates_.Remove(placed.id, changes);
+    Show(changes);
+    ShowCandidate(placed.id);
+  } else {
+    duplicates_.Put(placed, zone, changes);
+    Show(changes);
+    HideUnshown(placed.id);
+  }
 }
 
-/// A page may know it as shown from before the region's start, when the other zone's was hidden.
+/// Of a hazard that another zone's hides. A page may know it as shown from before the region's
+/// start, when the other zone's was hidden; and it was shown as long as it was a candidate.
 void RegionMap::HideUnshown(const Uuid& id) {
+  WithdrawCandidate(id);
   const WriterLock lock(data_mutex_);
   if (shown_.count(id) != 0) return;
   PutShown(told_.at(id));
   RemoveShown(id);
 }
 
+void RegionMap::ShowCandidate(const Uuid& id) {
+  zone::ZoneEvent event;
+  {
+    const WriterLock lock(data_mutex_);
+    event.hazard = PutShown(told_.at(id));
+  }
+  stream_.Publish(event);
+}
+
+void RegionMap::WithdrawCandidate(const Uuid& id) {
+  zone::ZoneEvent event;
+  {
+    const WriterLock lock(data_mutex_);
+    const auto found = shown_.find(id);
+    if (found == shown_.end()) return;
+    if (found->second.hazard.state != zone::HazardState::kCandidate) return;
+    event.hazard = RemoveShown(id);
+    ForgetOldest();
+  }
+  stream_.Publish(event);
+}
+
+/// What the hazard was before stands in `told_`.
+void RegionMap::CountCandidate(const std::string& zone, const Uuid& id, bool is_candidate) {
+  const auto known = told_.find(id);
+  const bool was_candidate =
+      known != told_.end() && known->second.hazard.state == zone::HazardState::kCandidate;
+  if (is_candidate && !was_candidate) ++candidates_[zone];
+  if (!is_candidate && was_candidate) --candidates_[zone];
+}
+
 void RegionMap::RemoveOne(const std::string& zone, const Uuid& hazard) {
   if (by_zone_[zone].erase(hazard) == 0) return;
   const Uuid id = RegionHazardId(zone, hazard);
+  CountCandidate(zone, id, false);
   told_.erase(id);
   Duplicates::Changes changes;
   duplicates_.Remove(id, changes);
   Show(changes);
+  WithdrawCandidate(id);
 }
 
 void RegionMap::Show(const Duplicates::Changes& changes) {
@@ -129,6 +172,8 @@ void RegionMap::Show(const Duplicates::Changes& changes) {
 zone::HazardEvent RegionMap::PutShown(const Shown& shown) {
   Shown& kept = shown_[shown.hazard.uuid];
   const bool was_known = kept.hazard.sequence != 0;
+  const std::uint64_t announced_sequence = kept.hazard.announced_sequence;
+  const HazardOrigin before = kept.origin;
   zone::HazardEvent event;
   if (was_known) {
     by_sequence_.erase(kept.hazard.sequence);
@@ -137,32 +182,41 @@ zone::HazardEvent RegionMap::PutShown(const Shown& shown) {
     event.from = kept.hazard.state;
   }
   kept = shown;
-  kept.hazard.sequence = kept.hazard.announced_sequence = ++sequence_;
+  kept.origin.zone_since = shown.hazard.sequence;
+  kept.hazard.sequence = ++sequence_;
+  kept.origin.region_since = sequence_;
+  if (event.from == kept.hazard.state) {
+    kept.origin.zone_since = before.zone_since;
+    kept.origin.region_since = before.region_since;
+  }
   by_sequence_[sequence_] = kept.hazard.uuid;
   ++counts_.at(static_cast<std::size_t>(kept.hazard.state));
-  const bool was_there = event.from && zone::IsTold(*event.from);
+  event.announced = zone::IsTold(kept.hazard.state);
+  kept.hazard.announced_sequence = event.announced ? sequence_ : announced_sequence;
+  const bool was_there =
+      event.from && (event.announced ? zone::IsTold(*event.from) : zone::IsOnMap(*event.from));
   event.action = was_there ? zone::HazardAction::kUpdated : zone::HazardAction::kAdded;
   event.hazard = kept.hazard;
-  event.announced = true;
   return event;
 }
 
 std::optional<zone::HazardEvent> RegionMap::RemoveShown(const Uuid& id) {
   const auto found = shown_.find(id);
-  if (found == shown_.end() || !zone::IsTold(found->second.hazard.state)) return std::nullopt;
+  if (found == shown_.end() || !zone::IsOnMap(found->second.hazard.state)) return std::nullopt;
   zone::Hazard& hazard = found->second.hazard;
   zone::HazardEvent event;
   event.from = hazard.state;
   by_sequence_.erase(hazard.sequence);
   --counts_.at(static_cast<std::size_t>(hazard.state));
+  event.announced = zone::IsTold(hazard.state);
   hazard.state = zone::HazardState::kGone;
-  hazard.sequence = hazard.announced_sequence = ++sequence_;
+  hazard.sequence = ++sequence_;
+  if (event.announced) hazard.announced_sequence = sequence_;
   by_sequence_[sequence_] = id;
   gone_[sequence_] = id;
   ++counts_.at(static_cast<std::size_t>(hazard.state));
   event.action = zone::HazardAction::kRemoved;
   event.hazard = hazard;
-  event.announced = true;
   return event;
 }
 
@@ -180,6 +234,14 @@ std::size_t RegionMap::CountOf(const std::string& zone) const {
   const MutexLock lock(writer_mutex_);
   const auto hazards = by_zone_.find(zone);
   return hazards == by_zone_.end() ? 0 : hazards->second.size();
+}
+
+std::size_t RegionMap::ToldCountOf(const std::string& zone) const {
+  const MutexLock lock(writer_mutex_);
+  const auto hazards = by_zone_.find(zone);
+  if (hazards == by_zone_.end()) return 0;
+  const auto candidates = candidates_.find(zone);
+  return hazards->second.size() - (candidates == candidates_.end() ? 0 : candidates->second);
 }
 
 std::size_t RegionMap::hidden() const {

@@ -31,12 +31,17 @@ Uuid RegionHazardId(const std::string& zone, const Uuid& hazard);
 struct HazardOrigin {
   std::string zone;  ///< Its id.
   Uuid hazard;       ///< The zone's own id of the hazard.
+  /// Since when it is in its present state, by the zone's sequence and by the region's.
+  std::uint64_t zone_since = 0;
+  std::uint64_t region_since = 0;
 };
 
-/// The hazards of many zones as one map: those that drivers are told of. Each change gets the next
-/// number of the region's own sequence. A hazard that two zones hold at their border is on the map
-/// once (protocol::CrossZoneDuplicates). Classes that the catalogue does not name are under its
-/// heading for them (protocol::HazardCatalogue::HeadingOf).
+/// The hazards of many zones as one map: those that drivers are told of, and candidates, where they
+/// are followed, for officials. Each change gets the next number of the region's own sequence. A
+/// hazard that two zones hold at their border is on the map once, when drivers are told of it
+/// (protocol::CrossZoneDuplicates); a candidate neither hides another hazard nor is hidden. Classes
+/// that the catalogue does not name are under its heading for them
+/// (protocol::HazardCatalogue::HeadingOf).
 ///
 /// Hazards that left the map are remembered as gone, the newest kMaxGone of them, so that a page
 /// that was away hears of it. Thread-safe.
@@ -58,8 +63,10 @@ class RegionMap : public zone::MapReader {
   /// These hazards of the zone, by its own ids, leave the map.
   void Remove(const std::string& zone, const std::vector<Uuid>& hazards);
   /// How many hazards of the zone are there, those included that are not shown because another zone
-  /// has them.
+  /// has them, and candidates.
   std::size_t CountOf(const std::string& zone) const;
+  /// The same without candidates.
+  std::size_t ToldCountOf(const std::string& zone) const;
   /// Hazards that are not shown, because another zone has them.
   std::size_t hidden() const;
   /// Of a hazard that is on the map, or was and is remembered; none for any other.
@@ -108,6 +115,11 @@ class RegionMap : public zone::MapReader {
   /// Brings what is shown up to date and tells subscribers.
   void Show(const Duplicates::Changes& changes) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
   void HideUnshown(const Uuid& id) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  void ShowCandidate(const Uuid& id) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  /// A candidate that is on the map leaves it.
+  void WithdrawCandidate(const Uuid& id) REQUIRES(writer_mutex_) EXCLUDES(data_mutex_);
+  void CountCandidate(const std::string& zone, const Uuid& id, bool is_candidate)
+      REQUIRES(writer_mutex_);
   zone::HazardEvent PutShown(const Shown& shown) REQUIRES(data_mutex_);
   std::optional<zone::HazardEvent> RemoveShown(const Uuid& id) REQUIRES(data_mutex_);
   void ForgetOldest() REQUIRES(data_mutex_);
@@ -125,6 +137,8 @@ class RegionMap : public zone::MapReader {
   std::unordered_map<Uuid, Shown> told_ GUARDED_BY(writer_mutex_);
   /// The zone's own ids of its hazards that are there, by zone.
   std::map<std::string, std::unordered_set<Uuid>> by_zone_ GUARDED_BY(writer_mutex_);
+  /// How many of them are candidates.
+  std::map<std::string, std::size_t> candidates_ GUARDED_BY(writer_mutex_);
 
   /// Of what readers see. Never held while subscribers are told: they read.
   mutable SharedMutex data_mutex_;

@@ -8,6 +8,17 @@
 
 namespace livemap::region {
 
+namespace {
+
+/// Whoever waits for a zone waits as long as the region does, and a moment.
+web::WebConfig WithPatience(web::WebConfig options, const Region& region) {
+  constexpr double kMomentS = 2;
+  options.picture_timeout_s = region.config().timeout_s + kMomentS;
+  return options;
+}
+
+}  // namespace
+
 class RegionServer::Implementation {
  public:
   Implementation(const web::WebConfig& options, Region& region,
@@ -15,9 +26,12 @@ class RegionServer::Implementation {
       : hub_(region.map(), catalogue, trails_),
         site_(options, region, catalogue),
         live_{region.map(), catalogue, hub_},
-        server_(options, site_, &live_) {}
+        server_(WithPatience(options, region), site_, &live_) {}
   /// The region's threads must not call sessions that go away with the server.
-  ~Implementation() { hub_.Stop(); }
+  ~Implementation() {
+    hub_.Stop();
+    site_.Stop();
+  }
   Implementation(const Implementation&) = delete;
   Implementation& operator=(const Implementation&) = delete;
 

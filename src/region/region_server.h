@@ -8,13 +8,14 @@
 
 namespace livemap::region {
 
-/// The web server of a region: the live map's page, which can only be read there, the hazards of
-/// all zones, the open feeds, the live stream, and how the zones are (docs/reference/http-api.md).
-/// Whoever reaches it sees what drivers are told of; nobody can change anything.
+/// The web server of a region: the live map's page, the hazards of all zones, the open feeds, the
+/// live stream, and how the zones are (docs/reference/http-api.md). Whoever reaches it sees what
+/// drivers are told of. Where the options name accounts, officials who log in decide by way of the
+/// zones; else nobody can change anything.
 class RegionServer {
  public:
   /// Listens and serves from its own threads when it returns. Keeps references. Of the options
-  /// those about officials, accounts and pictures count for nothing. Throws Error when an option
+  /// those about tokens, who sees what, and pictures count for nothing. Throws Error when an option
   /// is not accepted or the port cannot be opened.
   RegionServer(const web::WebConfig& options, Region& region,
                const protocol::HazardCatalogue& catalogue);

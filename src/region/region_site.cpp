@@ -22,6 +22,8 @@ using web::MakeErrorAnswer;
 
 constexpr std::string_view kRegionLeafletPrefix = "/vendor/leaflet/";
 constexpr std::string_view kRegionTilePrefix = "/tiles/";
+constexpr std::string_view kRegionSession = "/api/v1/session";
+constexpr std::string_view kRegionConfirmation = "/api/v1/session/confirm";
 
 bool BeginsWith(std::string_view text, std::string_view prefix) {
   return text.substr(0, prefix.size()) == prefix;
@@ -45,6 +47,24 @@ web::Json Outlines(const directory::ZoneArea& area) {
     lines.push_back(std::move(line));
   }
   return {{"type", "MultiLineString"}, {"coordinates", std::move(lines)}};
+}
+
+/// To pages, which ask for them where candidates may be seen.
+HttpResponse NoMapChanges(const RegionMap& map) {
+  return JsonAnswer({{"type", "FeatureCollection"},
+                     {"log", map.LogId().ToString()},
+                     {"sequence", map.Sequence()},
+                     {"truncated", false},
+                     {"features", web::Json::array()}},
+                    "application/geo+json");
+}
+
+/// What is answered by the desk alone, to those who have logged in.
+bool IsForPeople(const std::string& path) {
+  const std::size_t hazard = std::string_view(web::kHazardAddress).size() + 1;
+  const bool is_hazard_itself =
+      IsBelow(path, web::kHazardAddress) && path.find('/', hazard) == std::string::npos;
+  return RegionDesk::IsAddress(path) && !is_hazard_itself;
 }
 
 template <typename Value>
@@ -125,26 +145,107 @@ RegionSite::RegionSite(const web::WebConfig& options, Region& region,
       leaflet_(options.leaflet_root + "/leaflet"),
       page_policy_(web::PagePolicy(web::TileSource(options.tile_url))) {
   if (!options_.tile_file.empty()) tiles_.emplace(options_.tile_file);
+  if (options_.accounts_file.empty()) return;
+  access_ = std::make_unique<web::Access>(options_);
+  accounts_ = std::make_unique<web::AccountApi>(*access_);
+  desk_ = std::make_unique<RegionDesk>(*access_, region, catalogue);
 }
 
-void RegionSite::Answer(const HttpRequest& question, const Done& done) { done(Answer(question)); }
+bool RegionSite::AnswersLater(const HttpRequest& question) const {
+  if (!desk_) return false;
+  try {
+    const std::string path = web::ParseTarget(question.target).path;
+    const bool is_read = question.method == "GET" || question.method == "HEAD";
+    if (question.method == "POST") return web::ParseDecisionTarget(path).has_value();
+    // Whoever has no session is told what everybody is.
+    return is_read && RegionDesk::IsAddress(path) && access_->PersonOf(question);
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+HttpResponse RegionSite::LateAnswer() const {
+  return web::MakeBusyAnswer("the zone has not answered in time: look before you try again");
+}
+
+bool RegionSite::IsByOfficial(const HttpRequest& question) const {
+  try {
+    return access_ && access_->IsByOfficial(question);
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+web::Visibility RegionSite::VisibilityFor(const HttpRequest& question) const {
+  web::Visibility sees{true, false, false};
+  try {
+    sees.candidates = access_ && access_->PersonOf(question).has_value();
+  } catch (const std::exception&) {  // Where the accounts cannot be read nobody has logged in.
+  }
+  return sees;
+}
+
+void RegionSite::Stop() {
+  if (desk_) desk_->Stop();
+}
+
+void RegionSite::Answer(const HttpRequest& question, const Done& done) {
+  if (!AnswersLater(question)) return done(Answer(question));
+  const Done finished = [this, done](HttpResponse answer) { done(Finish(std::move(answer))); };
+  try {
+    desk_->Answer(web::ParseTarget(question.target), question, finished);
+  } catch (const web::BadRequest& mistake) {
+    finished(MakeErrorAnswer(400, mistake.what()));
+  } catch (const std::exception&) {
+    finished(web::MakeBusyAnswer("the region does not answer"));
+  }
+}
 
 HttpResponse RegionSite::Answer(const HttpRequest& question) {
   HttpResponse answer;
   try {
-    if (question.method == "GET" || question.method == "HEAD") {
-      answer = Route(question);
-    } else {
-      answer = MakeErrorAnswer(
-          405, "the method is not allowed, accepted is GET, HEAD: a region can only be read");
-      answer.headers.emplace_back("Allow", "GET, HEAD");
-    }
+    answer = AnswerNow(question);
   } catch (const web::BadRequest& mistake) {
     answer = MakeErrorAnswer(400, mistake.what());
   } catch (const std::exception&) {
     answer = web::MakeBusyAnswer("the region does not answer");
   }
+  return Finish(std::move(answer));
+}
+
+HttpResponse RegionSite::Finish(HttpResponse answer) const {
   web::AddSecurityHeaders(page_policy_, answer);
+  return answer;
+}
+
+HttpResponse RegionSite::AnswerNow(const HttpRequest& question) {
+  const bool is_read = question.method == "GET" || question.method == "HEAD";
+  HttpResponse answer = is_read ? Route(question) : AnswerChange(question);
+  if (IsByOfficial(question)) answer.by_official = true;
+  return answer;
+}
+
+/// Any method but GET and HEAD.
+HttpResponse RegionSite::AnswerChange(const HttpRequest& question) {
+  const web::RequestTarget target = web::ParseTarget(question.target);
+  if (access_ && web::AccountApi::IsAddress(target.path)) {
+    return accounts_->Answer(target, question);
+  }
+  const bool is_session = target.path == kRegionSession;
+  const bool is_confirmation = target.path == kRegionConfirmation;
+  if (access_ && (is_session || is_confirmation)) {
+    web::RefuseQueryParameters(target);
+    if (is_confirmation && question.method == "POST") return access_->Confirm(question);
+    if (is_session && question.method == "POST") return access_->LogIn(question);
+    if (is_session && question.method == "DELETE") return access_->LogOut(question);
+  }
+  const std::string accepted = access_ && is_session        ? "GET, HEAD, POST, DELETE"
+                               : access_ && is_confirmation ? "POST"
+                                                            : "GET, HEAD";
+  HttpResponse answer =
+      MakeErrorAnswer(405, "the method is not allowed, accepted is " + accepted +
+                               (access_ ? "" : ": a region without accounts can only be read"));
+  answer.headers.emplace_back("Allow", accepted);
   return answer;
 }
 
@@ -152,6 +253,9 @@ HttpResponse RegionSite::Route(const HttpRequest& question) {
   const web::RequestTarget target = web::ParseTarget(question.target);
   const std::string& path = target.path;
   const web::Visibility sees = VisibilityFor(question);
+  if (access_ && web::AccountApi::IsAddress(path)) return accounts_->Answer(target, question);
+  if (sees.candidates && path == "/api/v1/changes") return NoMapChanges(region_.map());
+  if (desk_ && !sees.candidates && IsForPeople(path)) return web::LogInFirst();
   if (IsBelow(path, web::kHazardAddress)) return hazards_.Answer(target, sees.candidates);
   if (IsBelow(path, web::kFeedAddress)) return feeds_.Answer(target, question, sees);
   if (IsBelow(path, web::kOgcAddress)) return ogc_.Answer(target, question, sees);
@@ -174,11 +278,7 @@ HttpResponse RegionSite::RouteFixed(const web::RequestTarget& target, const Http
   if (path == "/api/v1/classes") return JsonAnswer(web::ClassesJson(catalogue_));
   if (path == "/api/v1/config") return Config();
   if (path == "/api/v1/zones") return JsonAnswer(ZonesJson(region_), "application/geo+json");
-  if (path == "/api/v1/session") {
-    return JsonAnswer({{"name", nullptr},
-                       {"has_accounts", false},
-                       {"sees", {{"told", true}, {"candidates", false}, {"vehicles", false}}}});
-  }
+  if (path == kRegionSession) return Session(question);
   if (BeginsWith(path, "/api/")) return MakeErrorAnswer(404, "there is nothing at this address");
   if (path == "/healthz") {
     return JsonAnswer({{"status", "ok"}, {"sequence", region_.map().Sequence()}});
@@ -191,6 +291,16 @@ HttpResponse RegionSite::RouteFixed(const web::RequestTarget& target, const Http
   }
   return web::FileAnswer(page_, path == "/" ? "index.html" : std::string_view(path).substr(1),
                          question);
+}
+
+HttpResponse RegionSite::Session(const HttpRequest& question) const {
+  const web::Visibility sees = VisibilityFor(question);
+  const web::Json seen{{"told", sees.told}, {"candidates", sees.candidates}, {"vehicles", false}};
+  if (!access_) return JsonAnswer({{"name", nullptr}, {"has_accounts", false}, {"sees", seen}});
+  HttpResponse answer = access_->Session(question);
+  web::Json told = web::Json::parse(answer.content);
+  told["sees"] = seen;
+  return JsonAnswer(told);
 }
 
 /// A region with zones that are down is ready: it shows their last state.
@@ -222,7 +332,7 @@ HttpResponse RegionSite::Config() const {
     config["tiles"] = {{"min_zoom", tiles_->min_zoom()}, {"max_zoom", tiles_->max_zoom()}};
   }
   config["centre"] = {options_.centre.longitude_deg, options_.centre.latitude_deg};
-  config["officials"] = false;
+  config["officials"] = access_ && access_->is_open();
   config["orders"] = false;
   config["streets"] = false;
   config["region"] = true;

@@ -26,26 +26,6 @@ constexpr std::size_t kMaxWordsBytes = 256;
 constexpr double kMaxSigmaM = 1e6;
 constexpr double kMaxAheadS = 86400;
 
-AnswerJson ParseAnswerJson(const std::string& text) {
-  if (text.size() > kMaxAnswerBytes) {
-    throw Error("the answer has " + std::to_string(text.size()) + " bytes, accepted are at most " +
-                std::to_string(kMaxAnswerBytes));
-  }
-  // Refused as it is read: what copies or destroys a value goes as deep as it does.
-  const auto check_depth = [](int depth, AnswerJson::parse_event_t, const AnswerJson&) {
-    if (depth <= kMaxAnswerDepth) return true;
-    throw Error("the answer nests values more than " + std::to_string(kMaxAnswerDepth) +
-                " deep, no zone's does");
-  };
-  try {
-    return AnswerJson::parse(text, check_depth);
-  } catch (const AnswerJson::parse_error& error) {
-    throw Error("the answer is no JSON: it is wrong at byte " + std::to_string(error.byte));
-  } catch (const AnswerJson::out_of_range&) {
-    throw Error("the answer has a number that is too large for JSON");
-  }
-}
-
 [[noreturn]] void RefuseMember(const std::string& name, const std::string& accepted) {
   throw Error("'" + name + "' is not acceptable, accepted is " + accepted);
 }
@@ -174,6 +154,26 @@ ToldHazard ReadToldHazard(const AnswerJson& feature, std::int64_t now_ns) {
 }
 
 }  // namespace
+
+nlohmann::json ParseAnswerJson(const std::string& text) {
+  if (text.size() > kMaxAnswerBytes) {
+    throw Error("the answer has " + std::to_string(text.size()) + " bytes, accepted are at most " +
+                std::to_string(kMaxAnswerBytes));
+  }
+  // Refused as it is read: what copies or destroys a value goes as deep as it does.
+  const auto check_depth = [](int depth, AnswerJson::parse_event_t, const AnswerJson&) {
+    if (depth <= kMaxAnswerDepth) return true;
+    throw Error("the answer nests values more than " + std::to_string(kMaxAnswerDepth) +
+                " deep, no zone's does");
+  };
+  try {
+    return AnswerJson::parse(text, check_depth);
+  } catch (const AnswerJson::parse_error& error) {
+    throw Error("the answer is no JSON: it is wrong at byte " + std::to_string(error.byte));
+  } catch (const AnswerJson::out_of_range&) {
+    throw Error("the answer has a number that is too large for JSON");
+  }
+}
 
 ToldHazard ParseToldHazard(const std::string& text, std::int64_t now_ns) {
   return ReadToldHazard(ParseAnswerJson(text), now_ns);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,8 @@ constexpr std::size_t kMaxAnswerBytes = 4 << 20;
 struct ToldHazard {
   zone::Hazard hazard;
   streets::StreetWords words;
-  /// Drivers are told of it; else it has left the map.
-  bool IsThere() const { return zone::IsTold(hazard.state); }
+  /// Else it has left the map.
+  bool IsThere() const { return zone::IsOnMap(hazard.state); }
 };
 
 /// What a zone answers who follows its log: `GET /api/v1/hazards?since=SEQUENCE`
@@ -44,6 +45,10 @@ struct ZoneAnswer {
 /// numbers, texts that are not acceptable as a vehicle's would not be, times before 1970 or more
 /// than a day after `now_ns` (UTC, ns since 1970).
 ZoneAnswer ParseZoneAnswer(const std::string& text, std::uint64_t after, std::int64_t now_ns);
+
+/// Reads a text as JSON that a zone may have written: at most kMaxAnswerBytes, and nested as deep
+/// as a zone's answers are. Throws Error that says what is wrong.
+nlohmann::json ParseAnswerJson(const std::string& text);
 
 /// Reads one hazard as the GeoJSON Feature that a zone tells, as ParseZoneAnswer does. Throws Error
 /// for one that is not acceptable.

@@ -31,6 +31,7 @@ std::string ScopeOf(const RegionZone& zone) {
     text += "only " + std::to_string(zone.only->margin_m);
     AppendRings(zone.only->area, text);
   }
+  if (zone.with_candidates) text += "candidates";
   return text.empty() ? text : Sha256Hex(text).substr(0, 16);
 }
 
@@ -44,6 +45,14 @@ std::size_t LetGoBeyond(const Surroundings& reach, std::vector<ToldHazard>& haza
     ++count;
   }
   return count;
+}
+
+/// A zone tells of candidates, too, that they left what it was asked for.
+void LetGoCandidates(std::vector<ToldHazard>& hazards) {
+  for (ToldHazard& told : hazards) {
+    zone::HazardState& state = told.hazard.state;
+    if (state == zone::HazardState::kCandidate) state = zone::HazardState::kGone;
+  }
 }
 
 std::string TroubleOf(const orders::HttpAnswer& answer) {
@@ -73,12 +82,13 @@ ZoneFollower::ZoneFollower(RegionZone zone, Call call, Clock now_ns, RegionMap& 
   if (place_.scope != scope) place_.log = Uuid{};
   place_.scope = scope;
   saved_heard_ns_ = place_.heard_ns;
+  if (!zone_.with_candidates) LetGoCandidates(kept.hazards);
   KeepSurroundings(kept.hazards);
   map_.Apply(zone_.id, kept.hazards);
   const MutexLock lock(mutex_);
   status_.heard_ns = place_.heard_ns;
   status_.trouble = "it has not been asked since the region's start";
-  status_.hazards = map_.CountOf(zone_.id);
+  status_.hazards = map_.ToldCountOf(zone_.id);
 }
 
 bool ZoneFollower::Step() {
@@ -97,7 +107,8 @@ bool ZoneFollower::Step() {
 ZoneAnswer ZoneFollower::Ask(std::uint64_t after) {
   orders::HttpCall call;
   call.url = zone_.url + "/api/v1/hazards?since=" + std::to_string(after) +
-             "&limit=" + std::to_string(kHazardsPerAnswer) + "&state=active,verifying";
+             "&limit=" + std::to_string(kHazardsPerAnswer) +
+             "&state=" + (zone_.with_candidates ? "candidate," : "") + "active,verifying";
   if (!zone_.token.empty()) call.headers.push_back("Authorization: Bearer " + zone_.token);
   call.max_answer_bytes = kMaxAnswerBytes;
   const orders::HttpAnswer answer = call_(call);
@@ -122,6 +133,7 @@ bool ZoneFollower::Take(ZoneAnswer answer, std::uint64_t after) {
     // It was asked from the other log's sequence.
     if (after > 0) return true;
   }
+  if (!zone_.with_candidates) LetGoCandidates(answer.hazards);
   LeaveOutBeyond(answer);
   KeepSurroundings(answer.hazards);
   LogPlace place = place_;
@@ -186,7 +198,7 @@ void ZoneFollower::KeepSurroundings(std::vector<ToldHazard>& hazards) const {
 }
 
 void ZoneFollower::SayUp(const ZoneAnswer& answer) {
-  const std::size_t hazards = map_.CountOf(zone_.id);
+  const std::size_t hazards = map_.ToldCountOf(zone_.id);
   const MutexLock lock(mutex_);
   status_.is_up = true;
   status_.trouble.clear();

@@ -39,6 +39,7 @@ struct RegionZone {
   std::optional<directory::ZoneArea> area;  ///< None: it is not known.
   /// Of its hazards these alone count; none: all of them.
   std::optional<Surroundings> only = std::nullopt;
+  bool with_candidates = false;  ///< Also hazards that drivers are not told of yet.
 };
 
 /// How a zone is, as far as the region knows.

@@ -27,6 +27,7 @@ class RegionMapTest : public testing::Test {
       events_.push_back(std::to_string(static_cast<int>(event.hazard->action)) + ' ' +
                         NameOf(event.hazard->hazard.uuid));
       sequences_.push_back(event.hazard->hazard.sequence);
+      announced_.push_back(event.hazard->announced);
     });
   }
   ~RegionMapTest() override { map_.Unsubscribe(subscription_); }
@@ -56,9 +57,14 @@ class RegionMapTest : public testing::Test {
     return names;
   }
 
+  std::uint64_t Announced(const std::string& zone, std::uint8_t number) const {
+    return map_.Find(RegionHazardId(zone, IdOf(number)))->announced_sequence;
+  }
+
   RegionMap map_{protocol::HazardCatalogue(), 1000, std::nullopt};
   std::vector<std::string> events_;
   std::vector<std::uint64_t> sequences_;
+  std::vector<bool> announced_;
   int subscription_ = 0;
 };
 
@@ -74,6 +80,64 @@ TEST_F(RegionMapTest, HasTheHazardsOfAllZonesEachWithASequenceOfItsOwn) {
   const auto found = map_.Find(RegionHazardId("south", IdOf(1)));
   ASSERT_TRUE(found);
   EXPECT_EQ(map_.WordsOf(*found).street, "Forbes Ave");
+}
+
+TEST_F(RegionMapTest, OfACandidateNobodyHearsWhoHearsWhatDriversAreTold) {
+  map_.Apply("north", {ToldCandidate(1, 5), Told(2, 6, EastBy(100))});
+  EXPECT_THAT(Listed(), ElementsAre("north 1", "north 2"));
+  EXPECT_EQ(announced_, (std::vector<bool>{false, true}));
+  EXPECT_EQ(Announced("north", 1), 0U);
+  EXPECT_EQ(map_.CountOf("north"), 2U);
+  EXPECT_EQ(map_.ToldCountOf("north"), 1U);
+  map_.Apply("north", {ToldCandidate(1, 7)});
+  EXPECT_EQ(events_.back(), "1 north 1");
+  // Drivers are told of it: to them it is new.
+  map_.Apply("north", {Told(1, 8)});
+  EXPECT_EQ(events_.back(), "0 north 1");
+  EXPECT_EQ(Announced("north", 1), map_.Sequence());
+  EXPECT_EQ(map_.ToldCountOf("north"), 2U);
+}
+
+TEST_F(RegionMapTest, AHazardThatIsACandidateAgainIsTakenBackFromDrivers) {
+  map_.Apply("north", {Told(1, 5)});
+  map_.Apply("north", {ToldCandidate(1, 6)});
+  EXPECT_THAT(events_, ElementsAre("0 north 1", "2 north 1", "0 north 1"));
+  EXPECT_EQ(announced_, (std::vector<bool>{true, true, false}));
+  EXPECT_THAT(Listed({zone::HazardState::kCandidate}), ElementsAre("north 1"));
+  EXPECT_EQ(Announced("north", 1), 1002U) << "who asks drivers' hazards hears that it left";
+  map_.Apply("north", {ToldGone(1, 7)});
+  EXPECT_THAT(Listed(), IsEmpty());
+  EXPECT_FALSE(announced_.back());
+  EXPECT_EQ(map_.CountOf("north") + map_.ToldCountOf("north"), 0U);
+  const auto counts = map_.HazardCounts();
+  EXPECT_EQ(counts[static_cast<std::size_t>(zone::HazardState::kCandidate)], 0U);
+  EXPECT_EQ(counts[static_cast<std::size_t>(zone::HazardState::kGone)], 1U);
+}
+
+TEST_F(RegionMapTest, ACandidateHidesNoHazardAndIsNotHidden) {
+  map_.Apply("north", {ToldCandidate(1, 5)});
+  map_.Apply("south", {Told(1, 5)});
+  EXPECT_THAT(Listed(), ElementsAre("north 1", "south 1"));
+  EXPECT_EQ(map_.hidden(), 0U);
+  // Confirmed it is the other zone's hazard, which is shown.
+  map_.Apply("north", {Told(1, 6)});
+  EXPECT_THAT(Listed(), ElementsAre("south 1"));
+  EXPECT_EQ(map_.hidden(), 1U);
+  EXPECT_EQ(events_.back(), "2 north 1");
+  EXPECT_FALSE(announced_.back()) << "drivers never heard of it";
+  map_.Remove("south", {IdOf(1)});
+  EXPECT_THAT(Listed(), ElementsAre("north 1"));
+}
+
+TEST_F(RegionMapTest, KnowsSinceWhenAHazardIsInItsState) {
+  map_.Apply("north", {ToldCandidate(1, 5)});
+  map_.Apply("north", {ToldCandidate(1, 9)});
+  const Uuid id = RegionHazardId("north", IdOf(1));
+  EXPECT_EQ(map_.OriginOf(id)->zone_since, 5U);
+  EXPECT_EQ(map_.OriginOf(id)->region_since, 1001U);
+  map_.Apply("north", {Told(1, 12)});
+  EXPECT_EQ(map_.OriginOf(id)->zone_since, 12U);
+  EXPECT_EQ(map_.OriginOf(id)->region_since, map_.Sequence());
 }
 
 TEST_F(RegionMapTest, AZoneCannotTakeThePlaceOfAnotherOnesHazard) {

@@ -31,6 +31,14 @@ inline ToldHazard Told(std::uint8_t number, std::uint64_t sequence,
   return told;
 }
 
+/// One that drivers are not told of yet.
+inline ToldHazard ToldCandidate(std::uint8_t number, std::uint64_t sequence,
+                                const geo::GeoPoint& position = {40.44, -79.94}) {
+  ToldHazard told = Told(number, sequence, position);
+  told.hazard.state = zone::HazardState::kCandidate;
+  return told;
+}
+
 /// One that has left the map.
 inline ToldHazard ToldGone(std::uint8_t number, std::uint64_t sequence) {
   ToldHazard told = Told(number, sequence);

@@ -72,7 +72,8 @@ class ZoneFollowerTest : public testing::Test {
   }
   void Follow(std::optional<directory::ZoneArea> area) {
     follower_ = std::make_unique<ZoneFollower>(
-        RegionZone{"north", "", zone_.url(), token_, std::move(area)},
+        RegionZone{"north", "", zone_.url(), token_, std::move(area), std::nullopt,
+                   with_candidates_},
         [this](const auto& call) {
           urls_.push_back(call.url);
           return client_.Call(call);
@@ -94,6 +95,7 @@ class ZoneFollowerTest : public testing::Test {
   web::TemporaryFolder folder_;
   RealZone zone_;
   std::string token_;
+  bool with_candidates_ = false;
   std::int64_t now_ns_ = web::ZoneFixture::kStartNs + 1'000'000'000;
   orders::NetworkClient client_{{"", 5, nullptr}};
   std::vector<std::string> urls_;
@@ -122,6 +124,26 @@ TEST_F(ZoneFollowerTest, HasWhatAZoneTellsDriversAndFollowsItBySequence) {
   ASSERT_THAT(Listed(), SizeIs(1));
   EXPECT_EQ(Listed()[0].position.latitude_deg, 40.46);
   EXPECT_EQ(follower_->status().begun_anew, 0U);
+}
+
+TEST_F(ZoneFollowerTest, ReadsCandidatesAnewWhenTheyAreWantedAndLetsGoOfThemAgain) {
+  zone_.Add(kPlace);
+  zone_.fixture().zone->Handle(zone_.fixture().MakeReport("debris", {40.45, -79.94}));
+  StepToEnd();
+  EXPECT_THAT(Listed(), SizeIs(1));
+  with_candidates_ = true;
+  Restart();
+  StepToEnd();
+  EXPECT_THAT(urls_.back(), HasSubstr("&state=candidate,active,verifying"));
+  EXPECT_THAT(Listed(), SizeIs(2));
+  EXPECT_EQ(follower_->status().hazards, 1U);
+  Restart();
+  EXPECT_THAT(Listed(), SizeIs(2)) << "the last state of candidates was not kept";
+  with_candidates_ = false;
+  Restart();
+  EXPECT_THAT(Listed(), SizeIs(1)) << "a candidate is on a map that everybody sees";
+  StepToEnd();
+  EXPECT_THAT(Listed(), SizeIs(1));
 }
 
 TEST_F(ZoneFollowerTest, ReadsAZoneOfManyAnswers) {
