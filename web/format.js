@@ -43,6 +43,12 @@ export function plural(count, singular, many = `${singular}s`) {
   return `${count.toLocaleString('en')} ${count === 1 ? singular : many}`;
 }
 
+/** Which zones of a region a list lacks, because they are down or did not answer in time; empty for
+ * none. A zone's own lists have no `missing`. */
+export function missingText({ missing = [] }) {
+  return missing.length === 0 ? '' : `Not heard: ${missing.join(', ')}.`;
+}
+
 /** Where on the streets a hazard lies: "Forbes Ave, near S Craig St, eastbound"; empty where nothing is
  * known of it. */
 export function streetText({ street, near, bound }) {

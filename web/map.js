@@ -83,8 +83,9 @@ class Page {
       (vehicle) => this.officials.vehicleButtons(vehicle));
     this.layer = new HazardLayer(this.map, data, this.catalogue,
       (hazard) => popupContent(hazard, this.catalogue, config.streets, this.repair.rows(hazard),
-        // A hazard's history stays in its zone.
-        [...this.frames.section(hazard), ...(config.region ? [] : [this.history.section(hazard)]),
+        // A region tells a hazard's history to those alone who have logged in.
+        [...this.frames.section(hazard),
+          ...(config.region && session.name === null ? [] : [this.history.section(hazard)]),
           ...this.officials.buttons(hazard, this.work.button(hazard))]),
       (hazard) => hazardRow(this.catalogue, hazard),
       this.sheet.coveredHeight());
@@ -128,7 +129,8 @@ class Page {
       () => (this.inView.checked ? unitBox(this.map.getBounds()) : null));
     this.filter = new ClassFilter(data, this.catalogue, () => this.showAll());
     this.states = new StateFilter(data, () => this.showAll(),
-      config.officials ? (shown) => this.showRejected(shown) : null);
+      // What was rejected has left a region's map.
+      config.officials && !config.region ? (shown) => this.showRejected(shown) : null);
     this.age = new AgeFilter((age) => {
       data.showAge(age);
       this.showAll();

@@ -36,8 +36,13 @@ class Door:
 
     def __init__(self):
         self.target = None
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.url = f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+        self.port = 0
+        self.open()
+        self.port = self.listener.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+
+    def open(self):
+        self.listener = socket.create_server(("127.0.0.1", self.port))
         threading.Thread(target=self.serve, daemon=True).start()
 
     def serve(self):
@@ -67,6 +72,8 @@ class Door:
             other.close()
 
     def close(self):
+        """Whoever knocks is refused, as where no process listens."""
+        self.listener.shutdown(socket.SHUT_RDWR)  # Else whoever waits for guests keeps it open.
         self.listener.close()
 
 

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """The page of a region in real Chromium: hazards of all zones, outlines, a zone that is down in grey.
 
-  region_page_test.py --server PATH_OF_map_page_server --region PATH_OF_livemap_serve_region [--screenshots DIR]
+  region_page_test.py --server PATH_OF_map_page_server --region PATH_OF_livemap_serve_region
+    --user PATH_OF_livemap_zone_user [--screenshots DIR]
 
 Skips as map_page_test.py does.
 """
@@ -12,6 +13,7 @@ import sys
 import unittest
 
 from region_fixture import Region, Zone, directory_of, square, temporary_folder
+from parts_fixture import PASSWORD, Metropolis
 from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, MapPage, missing, start_browser, stop_browser
 
 
@@ -135,6 +137,57 @@ class Desktop(RegionPage):
         self.wait_listed(1)
 
 
+class OfficialsOfParts(MapPage):
+    """One zone of two parts: an official of the region at a keyboard."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.browser = start_browser(*cls.size, dark=cls.dark)
+        cls.addClassCleanup(stop_browser, cls.browser)
+
+    def setUp(self):
+        self.metro = Metropolis(temporary_folder(self), OPTIONS.region, OPTIONS.user)
+        self.addCleanup(self.metro.close)
+        self.metro.start()
+        self.addCleanup(self.browser.get, "about:blank")
+        self.browser.execute_cdp_cmd("Network.clearBrowserCookies", {})
+        self.browser.get_log("browser")
+
+    def test_an_official_logs_in_reviews_the_candidates_of_both_parts_and_finds_it_in_the_trail(self):
+        for name in self.metro.parts:
+            self.metro.report(name)
+        # Browsers keep a secure cookie of this machine's own.
+        self.browser.get(self.metro.region.url.replace("127.0.0.1", "localhost") + "/")
+        self.wait_state("live")
+        self.assertEqual(self.find("#list-count").get_attribute("textContent"), "0")
+        self.click("#session")
+        self.find("#log-in-name").send_keys("alice")
+        self.find("#log-in-password").send_keys(PASSWORD)
+        self.click("#log-in-submit")
+        self.wait(lambda: self.find("#session").text == "Log out alice", "alice has not logged in")
+        self.wait_state("live")
+        self.wait(lambda: self.find("#list-count").get_attribute("textContent") == "2", "not both candidates are listed")
+        self.assertFalse(self.find("#vehicle-section").is_displayed())
+        self.click("#review-open")
+        self.wait_for_text("#review-place", "1 of 2")
+        self.picture("region_review")
+        self.click("#review-confirm")
+        self.wait_for_text("#review-place", "2 of 2")
+        self.find("#review-reason").send_keys("a shadow")
+        self.click("#review-reject")
+        self.wait_for_text("#review-subject", "That was the last one")
+        self.click("#review-undo")
+        self.wait_for_text("#review-place", "2 of 2")
+        self.click("#review-close")
+        self.click("#trail-section summary")
+        self.wait(lambda: self.count(".trail-row") == 3, "the trail has not three decisions")
+        self.assertIn("alice at metro", self.find("#trail").text)
+        self.picture("region_trail")
+        self.metro.parts["metro-2"].kill()
+        self.wait(lambda: self.find('[data-zone="metro-2"]').get_attribute("data-state") == "down", "the part is not down")
+        self.assert_quiet()
+
+
 class Phone(RegionPage):
     size = (390, 844)
     dark = True
@@ -155,6 +208,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--server", required=True)
     parser.add_argument("--region", required=True)
+    parser.add_argument("--user", required=True)
     parser.add_argument("--screenshots")
     parser.add_argument("--failures")
     parser.add_argument("tests", nargs="*")

@@ -128,6 +128,8 @@ class RegionTest(unittest.TestCase):
                                 (["--zone", "a=http://b", "--port", "70000"], "accepted is 0 to 65535"),
                                 (["--zone", "a=http://b", "--ask-every-s", "nan"], "ask_every_s is nan"),
                                 (["--zone", "a=http://b", "--directory", "x"], "accepted are both or none"),
+                                (["--zone", "a=http://b", "--accounts", os.path.join(self.folder, "none")],
+                                 "accepted is a folder that there is"),
                                 (["--bad", "x"], "unknown flag '--bad'")):
             ended = subprocess.run([OPTIONS.region, *FILES, "--store", os.path.join(self.folder, "none"), *arguments],
                                    capture_output=True, text=True, check=False, timeout=60)

@@ -2,6 +2,7 @@
 // filter "assigned to", which holds for map and list.
 
 import { byId, element, setText } from '../dom.js';
+import { missingText } from '../format.js';
 import { hazardOf } from '../hazard_record.js';
 import { session } from '../session.js';
 import { getJson } from '../zone_lists.js';
@@ -20,6 +21,8 @@ export class AssignmentList {
     this.onLoaded = onLoaded;
     this.assignments = [];
     this.filtered = null;
+    /** Of which zones of a region nothing is known now, in a sentence. */
+    this.missing = '';
     this.section = byId('work-section');
     this.select = byId('work-filter');
     this.list = byId('work-list');
@@ -46,7 +49,9 @@ export class AssignmentList {
   async refresh() {
     if (this.section.hidden) return;
     try {
-      ({ assignments: this.assignments } = await getJson('/api/v1/assignments'));
+      const told = await getJson('/api/v1/assignments');
+      this.assignments = told.assignments;
+      this.missing = missingText(told);
     } catch (failure) {
       setText(byId('work-note'), 'The assignments cannot be loaded.');
       return;
@@ -70,8 +75,9 @@ export class AssignmentList {
     setText(byId('work-count'), late > 0 ? `${late} overdue` : String(this.assignments.length));
     byId('work-count').classList.toggle('overdue', late > 0);
     this.list.replaceChildren(...shown.slice(0, MAX_ROWS).map((one) => this.row(one)));
-    setText(byId('work-note'), shown.length === 0 ? 'Nothing is assigned here.'
-      : shown.length > MAX_ROWS ? `The first ${MAX_ROWS} of ${shown.length}.` : '');
+    const note = shown.length === 0 ? 'Nothing is assigned here.'
+      : shown.length > MAX_ROWS ? `The first ${MAX_ROWS} of ${shown.length}.` : '';
+    setText(byId('work-note'), [note, this.missing].filter((text) => text !== '').join(' '));
     const ids = chosen === EVERY ? null : shown.map(({ hazard }) => hazard);
     if (JSON.stringify(ids) === JSON.stringify(this.filtered)) return;
     this.filtered = ids;

@@ -1,7 +1,7 @@
 // What became of hazards, per class, street and week, for those who have logged in.
 
 import { byId, element } from '../dom.js';
-import { percent, plural } from '../format.js';
+import { missingText, percent, plural } from '../format.js';
 import { session } from '../session.js';
 import { getJson } from '../zone_lists.js';
 
@@ -78,7 +78,8 @@ export class StatisticsView {
     if (this.span.value !== weeks) return;
     this.body.replaceChildren(
       element('p', { class: 'decision-note' }, 'Precision is the share of the judged hazards that an '
-        + 'official confirmed: confirmed / (confirmed + rejected). Each decision counts in its own week.'),
+        + 'official confirmed: confirmed / (confirmed + rejected). Each decision counts in its own week. '
+        + missingText(told)),
       table('By class', 'Class', [...told.classes.map((one) => line(one.label, one)), line('All', told.all)]),
       table('By week, from Monday', 'Week', told.weeks.map((one) => line(one.week, one))),
       table(told.streets_cut ? 'By street, those with the most' : 'By street', 'Street',

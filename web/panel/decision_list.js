@@ -3,7 +3,7 @@
 
 import { OF_ORDERS } from '../desk/time_line.js';
 import { byId, element } from '../dom.js';
-import { ago, localTime, plural } from '../format.js';
+import { ago, localTime, missingText, plural } from '../format.js';
 import { hazardOf } from '../hazard_record.js';
 import { session } from '../session.js';
 import { getJson } from '../zone_lists.js';
@@ -50,7 +50,8 @@ export class DecisionList {
     this.list.append(...told.decisions.map((decision) => this.row(decision)));
     this.next = told.next;
     this.more.hidden = this.next === null;
-    this.note.textContent = this.list.childElementCount === 0 ? 'Nobody has decided anything yet.' : '';
+    this.note.textContent = [this.list.childElementCount === 0 ? 'Nobody has decided anything yet.' : '',
+      missingText(told)].filter((text) => text !== '').join(' ');
   }
 
   row(decision) {

@@ -2,9 +2,12 @@
 
 import { addressOf } from '../address.js';
 
-/** Only the server's own pictures: a path of /images with a content hash; null for anything else. */
+const OWN = /^\/images\/[0-9a-f]{64}(\?zone=[A-Za-z0-9._-]{1,64})?$/;
+
+/** Only the server's own pictures: a path of /images with a content hash, at a region with the zone
+ * that has it; null for anything else. */
 export function pictureAddress(path) {
-  return typeof path === 'string' && /^\/images\/[0-9a-f]{64}$/.test(path) ? addressOf(path) : null;
+  return typeof path === 'string' && OWN.test(path) ? addressOf(path) : null;
 }
 
 /** The zone makes one picture after the other, and sends away whom it keeps waiting. */
