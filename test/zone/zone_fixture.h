@@ -57,7 +57,7 @@ class ZoneTest : public testing::Test {
   }
   ~ZoneTest() override {
     std::filesystem::remove_all(directory_);
-    if (!store_url_.empty()) TestServer().DropDatabase(store_url_);
+    if (!store_url_.empty()) TestServer().TakeBack(store_url_);
   }
   void SetUp() override {
     if (IsOnPostgresql() && store_url_.empty()) {
@@ -68,7 +68,7 @@ class ZoneTest : public testing::Test {
   void EmptyStore() {
     std::filesystem::remove_all(directory_ + "/zone");
     if (store_url_.empty()) return;
-    TestServer().DropDatabase(store_url_);
+    TestServer().TakeBack(store_url_);
     store_url_ = TestServer().MakeDatabase();
   }
 
