@@ -48,6 +48,7 @@ function(livemap_gtest name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_definitions(${name} PRIVATE LIVEMAP_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_libraries(${name} PRIVATE ${TEST_DEPENDS} GTest::gmock GTest::gtest_main livemap_options)
+  livemap_link_fast(${name})
   if(NOT TEST_COMPUTES AND NOT livemap_simulation IN_LIST TEST_DEPENDS)
     # Half the time to compile, and hardly more to run.
     target_compile_options(${name} PRIVATE -O0)
