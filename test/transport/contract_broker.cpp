@@ -1,6 +1,5 @@
 #include "test/transport/contract_broker.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -8,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/comma_list.h"
 #include "common/error.h"
 
 namespace livemap::transport {
@@ -20,16 +20,6 @@ constexpr int kLargestMessageBytes = 2064 << 10;
 std::string FromEnvironment(const char* name) {
   const char* value = std::getenv(name);
   return value == nullptr ? "" : value;
-}
-
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
 }
 
 MqttAddress ParseTestAddress(const std::string& text) {

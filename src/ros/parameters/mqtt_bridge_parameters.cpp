@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "common/comma_list.h"
 #include "common/text_file.h"
 #include "ros/bridge/bridged_type.h"
 #include "ros/parameters/shared/shared_parameters.h"
@@ -185,14 +186,7 @@ transport::MqttAddress ParseBrokerAddress(const std::string& text) {
 
 std::vector<transport::MqttAddress> ParseBrokerAddresses(const std::string& list) {
   std::vector<transport::MqttAddress> addresses;
-  if (list.find_first_not_of(" \t\n") == std::string::npos) return addresses;
-  std::stringstream parts(list);
-  for (std::string part; std::getline(parts, part, ',');) {
-    const std::size_t begin = part.find_first_not_of(" \t\n");
-    const std::size_t end = part.find_last_not_of(" \t\n");
-    addresses.push_back(
-        ParseBrokerAddress(begin == std::string::npos ? "" : part.substr(begin, end - begin + 1)));
-  }
+  for (const std::string& part : SplitAtCommas(list)) addresses.push_back(ParseBrokerAddress(part));
   if (addresses.size() > kMaxOtherBrokers) {
     throw Error("parameter 'other_brokers' of the bridge has " + std::to_string(addresses.size()) +
                 " addresses, accepted are at most " + std::to_string(kMaxOtherBrokers));

@@ -1,9 +1,9 @@
 #include "ros/parameters/zone_cloudlet_parameters.h"
 
-#include <algorithm>
 #include <cstdlib>
 #include <vector>
 
+#include "common/comma_list.h"
 #include "ros/parameters/shared/datum_parameter.h"
 #include "ros/parameters/shared/shared_parameters.h"
 #include "zone/store/postgresql_url.h"
@@ -23,17 +23,6 @@ std::vector<double> ParseZoneNumbers(const std::string& text, std::size_t count)
     at = end + 1;
   }
   return numbers;
-}
-
-/// "a,b" as a and b; nothing as none.
-std::vector<std::string> SplitZoneList(const std::string& text) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
 }
 
 std::optional<geo::GeoBox> ReadZoneBounds(ParameterReader& parameters) {
@@ -398,7 +387,7 @@ void ReadZoneWeb(ParameterReader& parameters, const std::string& package_path,
                   "that it names last in X-Forwarded-For; all shares and limits hold for that "
                   "client. Where it names none, web_connections_per_client does not hold, because "
                   "all its clients have one address.");
-  web.proxies = SplitZoneList(proxies);
+  web.proxies = SplitAtCommas(proxies);
   parameters.Read("web_request_timeout_s", web.request_timeout_s, {0.1, 3600},
                   "Time for a request to arrive, also the longest pause between two, and the time "
                   "that a client has to agree on TLS.",
