@@ -14,14 +14,13 @@ import unittest
 
 from region_fixture import Region, Zone, directory_of, square, temporary_folder
 from parts_fixture import PASSWORD, Metropolis
-from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, MapPage, missing, start_browser, stop_browser
+from map_page_fixture import HOSTILE, LAT, LON, OPTIONS, MapPage, missing
 
 
 class RegionPage(MapPage):
     @classmethod
     def setUpClass(cls):
-        cls.browser = start_browser(*cls.size, dark=cls.dark)
-        cls.addClassCleanup(stop_browser, cls.browser)
+        cls.take_browser()
 
     def setUp(self):
         self.folder = temporary_folder(self)
@@ -37,7 +36,7 @@ class RegionPage(MapPage):
                              "--authority", self.authority, "--title", "All zones of the town")
         self.addCleanup(self.region.close)
         self.region.start()
-        self.addCleanup(self.browser.get, "about:blank")
+        self.addCleanup(self.leave, self.region.url + "/")
         self.browser.get_log("browser")
 
     def open(self):
@@ -142,8 +141,7 @@ class OfficialsOfParts(MapPage):
 
     @classmethod
     def setUpClass(cls):
-        cls.browser = start_browser(*cls.size, dark=cls.dark)
-        cls.addClassCleanup(stop_browser, cls.browser)
+        cls.take_browser()
 
     def setUp(self):
         self.metro = Metropolis(temporary_folder(self), OPTIONS.region, OPTIONS.user)

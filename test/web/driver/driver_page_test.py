@@ -89,7 +89,7 @@ class Page(fixture.MapPage):
     def setUp(self):
         self.vehicle = Vehicle()
         self.addCleanup(self.vehicle.close)
-        self.addCleanup(self.browser.get, "about:blank")
+        self.addCleanup(self.leave, self.vehicle.url)
         self.browser.get_log("browser")
 
     def open(self, **changes):

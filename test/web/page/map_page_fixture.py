@@ -106,12 +106,16 @@ def start_browser(width, height, dark=False, flags=()):
     browser = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
     browser.livemap_profile = profile
     browser.set_page_load_timeout(HANG_S)
+    show_as(browser, width, height, dark)
+    return browser
+
+
+def show_as(browser, width, height, dark=False):
+    """From now on pages see a screen of this size, in pixels, and a system that wants this colour scheme."""
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
         "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
-    if dark:
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
-            "features": [{"name": "prefers-color-scheme", "value": "dark"}]})
-    return browser
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
+        "features": [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]})
 
 
 def stop_browser(browser):
@@ -124,13 +128,22 @@ class MapPage(unittest.TestCase):
     dark = False
     server_arguments = ()
     accounts_folder = None  # Of all classes together.
+    common_browser = None  # Of them, too: to start one takes a processor as long as two tests do.
 
     @classmethod
     def setUpClass(cls):
         cls.launch_next()
         cls.addClassCleanup(lambda: ZoneProcess(process=cls.next_process).close())
-        cls.browser = start_browser(*cls.size, dark=cls.dark)
-        cls.addClassCleanup(stop_browser, cls.browser)
+        cls.take_browser()
+
+    @classmethod
+    def take_browser(cls):
+        """The program's browser, as this class wants its screen."""
+        if MapPage.common_browser is None:
+            MapPage.common_browser = start_browser(1400, 900)  # No screen is larger.
+            unittest.addModuleCleanup(stop_browser, MapPage.common_browser)
+        cls.browser = MapPage.common_browser
+        show_as(cls.browser, *cls.size, dark=cls.dark)
 
     @classmethod
     def launch_next(cls):
@@ -141,9 +154,17 @@ class MapPage(unittest.TestCase):
         self.zone = ZoneProcess(process=self.next_process)
         self.launch_next()
         self.addCleanup(self.zone.close)
-        self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
+        self.addCleanup(self.leave, self.zone.url)  # Before the zone goes.
         self.browser.execute_cdp_cmd("Network.clearBrowserCookies", {})
         self.browser.get_log("browser")
+
+    def leave(self, url):
+        """To what is no page of LiveMap, of the same host where that still answers: elsewhere, Chromium would end this
+        page's process and begin one for the next page."""
+        try:
+            self.browser.get(url + "favicon.ico")
+        except WebDriverException:
+            self.browser.get("about:blank")
 
     def open_accounts(self, public="all"):
         """From now on jones, miller and root may log in. Passwords are slow to hash, so that nobody guesses them:

@@ -58,8 +58,8 @@ class Https(LogIn):
     def setUp(self):
         self.zone = ZoneProcess("", "", "", *self.certificate.files)
         self.addCleanup(self.zone.close)
-        self.addCleanup(self.browser.get, "about:blank")  # Before the zone goes.
         self.zone.url = f"https://{HOST}:{self.zone.port}/"
+        self.addCleanup(self.leave, self.zone.url)  # Before the zone goes.
         self.browser.get_log("browser")
 
     def cookies(self):
