@@ -1,7 +1,7 @@
 #pragma once
 
+#include <map>
 #include <memory>
-#include <set>
 #include <string>
 
 #include "test/transport/broker_process.h"
@@ -34,7 +34,7 @@ bool IsBrokerInstalled(BrokerKind kind);
 /// with commas between, of a cluster. The zone logs in at the first one and vehicles at the last.
 /// LIVEMAP_TEST_BROKER_IDENTITY is a folder as `livemap zone init` and `enroll` make it, with the
 /// folder of 1003 still there. LIVEMAP_TEST_BROKER_LACKS names the tests, with commas between, of
-/// what this broker is known to lack.
+/// what this broker is known to lack: TEST=FAULT, or TEST where it has the fault of ejabberd.
 class ContractBroker {
  public:
   /// Makes certificates and starts the broker. Throws Error when it does not start, or when the
@@ -45,8 +45,12 @@ class ContractBroker {
   MqttConfig Login(const std::string& name, const std::string& owner) const;
   MqttConfig Login(const std::string& name) const { return Login(name, name); }
 
-  /// Whether this broker is known not to hold the test of this name.
-  bool Lacks(const std::string& test) const { return lacks_.count(test) != 0; }
+  /// The fault by which this broker is known not to hold the test of this name, in the test's
+  /// words; empty: it is known to hold it.
+  std::string KnownFault(const std::string& test) const {
+    const auto fault = known_faults_.find(test);
+    return fault == known_faults_.end() ? "" : fault->second;
+  }
 
  private:
   void RunZoneIdentity(const std::string& arguments) const;
@@ -60,7 +64,7 @@ class ContractBroker {
   std::string identity_ = directory_.path() + "/identity";
   MqttAddress zone_address_{"127.0.0.1", 0};
   MqttAddress vehicle_address_{"127.0.0.1", 0};
-  std::set<std::string> lacks_;
+  std::map<std::string, std::string> known_faults_;  ///< By the name of the test.
   ChildProcess process_;
 };
 
