@@ -93,7 +93,7 @@ class DriverAlerts {
     /// than sure_above, because of junctions, the driver is told only so long before, s, when more
     /// is known.
     double unsure_lead_s = 4.5;
-    double unsure_above = 0.58;  ///< Probability from which the driver is told then.
+    double unsure_above = 0.64;  ///< Probability from which the driver is told then.
     double sure_above = 0.97;
     /// Nearer than this, s, such an alert comes late anyway: from this probability.
     double late_s = 3.9;
