@@ -6,22 +6,14 @@
 
 #include "common/error.h"
 #include "common/number_text.h"
+#include "geo/polyline.h"
 
 namespace livemap::protocol {
 namespace {
 
 constexpr double kOffsetsPerM = 10;
 constexpr double kTextPerDegree = 1e7;  // A centimetre.
-
 constexpr double kOffLineM = 1.5;
-
-double OffLineM(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-                const Eigen::Vector2d& place) {
-  const Eigen::Vector2d way = to - from;
-  const double square = way.squaredNorm();
-  const double share = square > 0 ? std::clamp(way.dot(place - from) / square, 0.0, 1.0) : 0;
-  return (place - from - share * way).norm();
-}
 
 /// Appends the numbers of the places between `first` and `last` that the line needs, and of the
 /// last one (D. Douglas, T. Peucker 1973).
@@ -30,7 +22,7 @@ void AppendBends(const std::vector<Eigen::Vector2d>& places, std::size_t first, 
   double furthest_m = 0;
   std::size_t furthest = first;
   for (std::size_t i = first + 1; i < last; ++i) {
-    const double off_m = OffLineM(places[first], places[last], places[i]);
+    const double off_m = geo::OffLineM(places[first], places[last], places[i]);
     if (off_m > furthest_m) {
       furthest_m = off_m;
       furthest = i;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "datasets/seeded_random.h"
+#include "geo/polyline.h"
 
 namespace livemap::tools {
 namespace {
@@ -16,21 +17,13 @@ constexpr double kSameM = 0.6;       // So near a point of a line is the junctio
 constexpr std::size_t kSpan = 100;   // Points between two nodes at most.
 constexpr std::size_t kPiece = 500;  // Points of a piece at most, about.
 
-double OffLineM(const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-                const Eigen::Vector2d& place) {
-  const Eigen::Vector2d way = to - from;
-  const double square = way.squaredNorm();
-  const double share = square > 0 ? std::clamp(way.dot(place - from) / square, 0.0, 1.0) : 0;
-  return (place - from - share * way).norm();
-}
-
 /// Marks the points that the line needs between two (D. Douglas, T. Peucker 1973).
 void MarkBends(const DrawnLine& line, std::size_t first, std::size_t last,
                std::vector<bool>& marks) {
   double furthest_m = 0;
   std::size_t furthest = first;
   for (std::size_t i = first + 1; i < last; ++i) {
-    const double off_m = OffLineM(line[first], line[last], line[i]);
+    const double off_m = geo::OffLineM(line[first], line[last], line[i]);
     if (off_m > furthest_m) {
       furthest_m = off_m;
       furthest = i;
