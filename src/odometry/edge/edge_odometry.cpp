@@ -644,7 +644,10 @@ Matrix6d EdgeOdometry::WithinReach(const Matrix6d& covariance, double time_s) co
   GrowWhileLost(config_, 0, time_s, reach);
   const Eigen::LDLT<Matrix6d> sum(covariance + reach);
   if (sum.info() != Eigen::Success) return covariance;
-  return covariance - covariance * sum.solve(covariance);
+  // Joseph's form: no rounding makes a variance negative, however small the reach.
+  const Matrix6d gain = sum.solve(covariance).transpose();
+  const Matrix6d rest = Matrix6d::Identity() - gain;
+  return rest * covariance * rest.transpose() + gain * reach * gain.transpose();
 }
 
 VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {

@@ -371,6 +371,27 @@ TEST(EdgeOdometry, StripesDoNotMoveTheCameraAlongThem) {
   }
 }
 
+TEST(EdgeOdometry, NoVarianceIsNegativeHoweverShortTheTimeBetweenFrames) {
+  // A picture that repeats itself says next to nothing of the movement; in 100 ns there is none.
+  RgbdFrame frame;
+  frame.depth = cv::Mat(48, 64, CV_32FC1, cv::Scalar(2));
+  frame.grey.create(48, 64, CV_8UC1);
+  cv::Mat row(1, 61, CV_8UC1);
+  cv::RNG random(3);
+  random.fill(row, cv::RNG::UNIFORM, 0, 256);
+  for (int i = 0; i < 48 * 64; ++i) frame.grey.data[i] = row.at<std::uint8_t>((i + i / 97) % 61);
+  EdgeOdometry::Config config;
+  config.min_points = 10;
+  EdgeOdometry odometry(config, {50, 50, 31.5, 23.5, 64, 48});
+  for (int i = 0; i < 3; ++i) {
+    frame.stamp_ns = Stamp(0) + 100 * i;
+    const VoResult result = odometry.Track(frame);
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    EXPECT_GE(result.covariance.diagonal().minCoeff(), 0) << i;
+    EXPECT_GE(result.twist_covariance.diagonal().minCoeff(), 0) << i;
+  }
+}
+
 TEST(EdgeOdometry, OfAMovementAlongStripesItSaysThatItDoesNotKnowIt) {
   for (const double lean : {0.0, 0.01}) {
     EdgeOdometry odometry({}, {525, 525, 319.5, 239.5, 640, 480});
