@@ -4,12 +4,14 @@
 #include <utility>
 
 #include "common/error.h"
-#include "odometry/monocular/road_height.h"
 
 namespace livemap::odometry {
 
 DepthLearner::DepthLearner(const Config& config, const geo::CameraIntrinsics& camera)
-    : config_(config), camera_(camera), extractor_(config.edges), map_(config.depth, camera) {
+    : config_(config),
+      extractor_(config.edges),
+      map_(config.depth, camera),
+      road_(config.road, camera) {
   if (config.views_kept < 1 || config.views_kept > 100) {
     throw Error("views_kept is " + std::to_string(config.views_kept) + "; 1 to 100 is accepted");
   }
@@ -18,6 +20,7 @@ DepthLearner::DepthLearner(const Config& config, const geo::CameraIntrinsics& ca
 void DepthLearner::Clear() {
   views_.clear();
   map_.Clear();
+  road_.Reset();
 }
 
 void DepthLearner::Restart(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera) {
@@ -27,20 +30,21 @@ void DepthLearner::Restart(const cv::Mat& smooth, const Eigen::Isometry3d& world
 
 /// From the last keyframes' depths and from where the earlier keyframes see the new edges: the
 /// newest view, which is the nearest, first.
-LearntDepths DepthLearner::Learn(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera,
-                                 double metres_per_unit) {
-  const View& last = views_.back();
+LearntDepths DepthLearner::Learn(const PosedImage& now, double metres_per_unit,
+                                 const PosedImage& before) {
   map_.SetRange(static_cast<double>(config_.depth.min_depth_m) / metres_per_unit,
                 static_cast<double>(config_.depth.max_depth_m) / metres_per_unit);
-  map_.MoveTo(extractor_.Extract(smooth), world_from_camera.inverse() * last.world_from_camera);
+  map_.MoveTo(extractor_.Extract(now.smooth),
+              now.world_from_camera.inverse() * views_.back().world_from_camera);
   for (auto view = views_.rbegin(); view != views_.rend(); ++view) {
-    map_.Measure(smooth, view->grey, view->world_from_camera.inverse() * world_from_camera,
+    map_.Measure(now.smooth, view->smooth,
+                 view->world_from_camera.inverse() * now.world_from_camera,
                  view == views_.rbegin());
   }
   map_.Regularise();
   LearntDepths learnt;
-  if (config_.finds_road) {
-    learnt.road_height = RoadHeight(map_.edges(), camera_, config_.camera_pitch_rad);
+  if (config_.finds_road && !before.smooth.empty()) {
+    learnt.road_height = road_.Measure(now, before, map_.edges());
   }
   if (views_.size() >= static_cast<std::size_t>(config_.views_kept)) {
     views_.push_back(std::move(views_.front()));  // Its memory serves again.
@@ -48,8 +52,8 @@ LearntDepths DepthLearner::Learn(const cv::Mat& smooth, const Eigen::Isometry3d&
   } else {
     views_.emplace_back();
   }
-  smooth.copyTo(views_.back().grey);
-  views_.back().world_from_camera = world_from_camera;
+  now.smooth.copyTo(views_.back().smooth);
+  views_.back().world_from_camera = now.world_from_camera;
   learnt.depth = map_.DepthImage();
   learnt.inverse_depth_sigma = map_.SigmaImage();
   return learnt;

@@ -7,14 +7,16 @@
 
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/monocular/inverse_depth_map.h"
+#include "odometry/monocular/road_height.h"
 
 namespace livemap::odometry {
 
 /// What a keyframe without depth of its own has learnt, in units of the map.
 struct LearntDepths {
-  cv::Mat depth;                      ///< CV_32FC1, 0 unknown: InverseDepthMap::DepthImage.
-  cv::Mat inverse_depth_sigma;        ///< Same places: InverseDepthMap::SigmaImage.
-  std::optional<double> road_height;  ///< Of the camera over the road, where that was asked for.
+  cv::Mat depth;                ///< CV_32FC1, 0 unknown: InverseDepthMap::DepthImage.
+  cv::Mat inverse_depth_sigma;  ///< Same places: InverseDepthMap::SigmaImage.
+  /// Of the camera over the road, where that was asked for.
+  std::optional<RoadHeight> road_height{};
 };
 
 /// Learns the inverse depths on the edges of one keyframe after another, from where the last
@@ -26,8 +28,8 @@ class DepthLearner {
     InverseDepthMap::Config depth;
     /// Keyframes that a new one's depths are measured against, 1 to 100.
     int views_kept = 4;
-    bool finds_road = false;      ///< Whether LearntDepths::road_height is looked for.
-    double camera_pitch_rad = 0;  ///< For the road: positive looks down.
+    bool finds_road = false;  ///< Whether LearntDepths::road_height is looked for.
+    RoadHeightMeter::Config road;
   };
 
   /// Throws Error when the configuration is wrong.
@@ -37,26 +39,19 @@ class DepthLearner {
   void Restart(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera);
   void Clear();
 
-  /// Goes on to a new keyframe, `smooth`, which later ones are measured against. The depths that
-  /// are looked for are those of the configuration in metres. The images are valid until the next
-  /// call.
-  LearntDepths Learn(const cv::Mat& smooth, const Eigen::Isometry3d& world_from_camera,
-                     double metres_per_unit);
+  /// Goes on to a new keyframe, which later ones are measured against. The depths that are looked
+  /// for are those of the configuration in metres. `before`, an image from about one height of the
+  /// camera behind, is for the road; it may be empty. The images are valid until the next call.
+  LearntDepths Learn(const PosedImage& now, double metres_per_unit, const PosedImage& before);
 
   const InverseDepthMap& map() const { return map_; }
 
  private:
-  /// An earlier keyframe, in units of the map.
-  struct View {
-    cv::Mat grey;
-    Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
-  };
-
   Config config_;
-  geo::CameraIntrinsics camera_;
   EdgeExtractor extractor_;
   InverseDepthMap map_;
-  std::deque<View> views_;  // Newest last: the present keyframe.
+  RoadHeightMeter road_;
+  std::deque<PosedImage> views_;  // Keyframes, newest last: the present one.
 };
 
 }  // namespace livemap::odometry

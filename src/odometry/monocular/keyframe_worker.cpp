@@ -18,7 +18,8 @@ void LetFramesGoFirst() {
 
 KeyframeWorker::Made MadeOf(KeyframeWorker::Order order, DepthLearner& learner) {
   KeyframeWorker::Made made;
-  made.learnt = learner.Learn(order.smooth, order.result.world_from_camera, order.metres_per_unit);
+  made.learnt = learner.Learn({order.smooth, order.result.world_from_camera}, order.metres_per_unit,
+                              order.before);
   made.order = std::move(order);
   return made;
 }

@@ -24,6 +24,7 @@ class KeyframeWorker {
     cv::Mat smooth;   ///< The finest level of its pyramid, nobody else's.
     VoResult result;  ///< Where the camera was, in units of the map.
     double metres_per_unit = 1;
+    PosedImage before{};  ///< As DepthLearner::Learn wants it; nobody else's.
   };
   struct Made {
     Order order;

@@ -14,6 +14,9 @@ constexpr double kScaleWayM = 1.0;
 constexpr double kFastestMps = 200;
 /// Of the camera's height: the load, the road's crown.
 constexpr double kHeightSigmaM = 0.05;
+/// Between two images that tell the road's plane, and from one that is kept to the next.
+constexpr double kRoadStepM = 1.0;
+constexpr double kRoadSpacingM = 0.25;
 /// What all heights of one drive have in common, and no mean of them lessens: pitch, the road's
 /// crown. A share of the height, and of one that a better source has taught.
 constexpr double kSharedHeightSigma = 0.03;
@@ -50,7 +53,8 @@ DepthLearner::Config LearnerOfMonocular(const MonocularOdometry::Config& config)
   learner.depth = config.depth;
   learner.views_kept = config.views_kept;
   learner.finds_road = config.scale_source != ScaleSource::kSpeed;
-  learner.camera_pitch_rad = config.camera_pitch_rad;
+  learner.road.camera_height_m = config.camera_height_m;
+  learner.road.camera_pitch_rad = config.camera_pitch_rad;
   return learner;
 }
 
@@ -359,8 +363,10 @@ bool MonocularOdometry::MakeFirstKeyframe(const Eigen::Isometry3d& first_from_ne
   last_unscaled_ = Eigen::Isometry3d::Identity();
   ForgetWay();
   learner_.Restart(start_.first(), map_from_first_);
-  const LearntDepths learnt = learner_.Learn(odometry_.images()[0], Eigen::Isometry3d::Identity(),
-                                             scale_.metres_per_unit());
+  recent_.clear();
+  const LearntDepths learnt =
+      learner_.Learn({odometry_.images()[0], Eigen::Isometry3d::Identity()},
+                     scale_.metres_per_unit(), {start_.first(), map_from_first_});
   OnLearnt(learnt);
   return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, twist);
 }
@@ -382,6 +388,7 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
   if (Slides(last_unscaled_.inverse() * unscaled.world_from_camera)) return GiveUp(frame);
   if (const auto remade = CheckStart(frame, unscaled)) return *remade;
   MeasureScale(unscaled.world_from_camera);
+  Remember(unscaled.world_from_camera);
   if (unscaled.keyframe_due) {
     unscaled.new_keyframe = MakeKeyframe(frame, unscaled) || unscaled.new_keyframe;
   }
@@ -392,16 +399,18 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
 /// Makes the present frame a keyframe, or has it made.
 bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled) {
   const double scale = scale_.metres_per_unit();
+  PosedImage before = recent_.empty() ? PosedImage{} : recent_.front();
   if (!worker_) {
     const LearntDepths learnt =
-        learner_.Learn(odometry_.images()[0], unscaled.world_from_camera, scale);
+        learner_.Learn({odometry_.images()[0], unscaled.world_from_camera}, scale, before);
     OnLearnt(learnt);
     return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, unscaled.twist);
   }
   if (worker_->busy()) return false;
   ordered_ns_ = frame.stamp_ns;
-  worker_->Give(
-      {frame.stamp_ns, frame.grey.clone(), odometry_.images()[0].clone(), unscaled, scale});
+  before.smooth = before.smooth.clone();
+  worker_->Give({frame.stamp_ns, frame.grey.clone(), odometry_.images()[0].clone(), unscaled, scale,
+                 std::move(before)});
   return false;
 }
 
@@ -423,19 +432,41 @@ void MonocularOdometry::OnLearnt(const LearntDepths& learnt) {
   if (learnt.road_height) MeasureByHeight(*learnt.road_height);
 }
 
+/// The images of about the last metre, for the road; of whatever the map's unit is where nobody
+/// knows metres.
+void MonocularOdometry::Remember(const Eigen::Isometry3d& world_from_camera) {
+  if (config_.scale_source == ScaleSource::kSpeed) return;
+  const auto way_m = [&](const PosedImage& from) {
+    return scale_.metres_per_unit() *
+           (world_from_camera.translation() - from.world_from_camera.translation()).norm();
+  };
+  if (recent_.size() > 1 && way_m(recent_.back()) < kRoadSpacingM) return;
+  PosedImage now;
+  if (recent_.size() > 1 && way_m(recent_[1]) >= kRoadStepM) {
+    now = std::move(recent_.front());  // Its memory serves again.
+    recent_.pop_front();
+  }
+  odometry_.images()[0].copyTo(now.smooth);
+  now.world_from_camera = world_from_camera;
+  recent_.push_back(std::move(now));
+}
+
 /// By the height that the camera is said to have; where a better source has told metres, by the one
 /// that it had then.
-void MonocularOdometry::MeasureByHeight(double height_units) {
+void MonocularOdometry::MeasureByHeight(const RoadHeight& height) {
   if (config_.scale_source == ScaleSource::kSpeed) return;
+  const auto sigma_m = [&height](double height_m) {
+    return std::hypot(kHeightSigmaM, height.relative_sigma * height_m);
+  };
   if (config_.scale_source == ScaleSource::kCameraHeight) {
-    scale_.Measure(config_.camera_height_m, kHeightSigmaM, height_units);
+    scale_.Measure(config_.camera_height_m, sigma_m(config_.camera_height_m), height.units);
     HasTold(MetresSource::kHeight, kSharedHeightSigma);
     return;
   }
   const bool better_tells = source_ == MetresSource::kWheels || source_ == MetresSource::kReceiver;
   if (better_tells) {
     if (scale_.log_sigma().value_or(1) > kTeachingSigma) return;
-    const double log_height = std::log(height_units * scale_.metres_per_unit());
+    const double log_height = std::log(height.units * scale_.metres_per_unit());
     log_height_ = log_height_.value_or(log_height);
     *log_height_ += kHeightShare * (log_height - *log_height_);
     height_variance_ = kSharedTaughtSigma * kSharedTaughtSigma;
@@ -448,7 +479,7 @@ void MonocularOdometry::MeasureByHeight(double height_units) {
     height_variance_ = kSharedHeightSigma * kSharedHeightSigma;
   }
   if (!scale_.log_sigma()) fixes_.Reset();  // Their distance was in units.
-  scale_.Measure(height_m, kHeightSigmaM, height_units);
+  scale_.Measure(height_m, sigma_m(height_m), height.units);
   height_told_ns_ = now_ns_;
   // Fixes teach how high the camera is: they are still the source.
   const MetresSource source = source_ == MetresSource::kFixes ? source_ : MetresSource::kHeight;

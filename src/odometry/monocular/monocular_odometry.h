@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -54,7 +55,8 @@ class MonocularOdometry {
     double speed_sigma_mps = 0.2;  ///< Standard deviation of MonocularFrame::speed_mps.
     double min_speed_mps = 1.0;    ///< Slower than that, a speed says nothing about the scale.
     double camera_height_m = 1.6;  ///< Of kCameraHeight: over the road.
-    double camera_pitch_rad = 0;   ///< Of kCameraHeight: positive looks down.
+    /// Of kCameraHeight: positive looks down; none: as it sees the direction of travel.
+    std::optional<double> camera_pitch_rad{};
     /// A source of metres counts for so long after it has told, s; fixes, which tell more rarely,
     /// for FixBaseline::Config::longest_s more.
     double source_age_s = 5.0;
@@ -131,6 +133,7 @@ class MonocularOdometry {
   bool MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled);
   bool TakeKeyframe();
   void OnLearnt(const LearntDepths& learnt);
+  void Remember(const Eigen::Isometry3d& world_from_camera);
   void AddWay(const MonocularFrame& frame);
   void ForgetWay();
   std::optional<double> WayOfStart(const MonocularFrame& frame);
@@ -139,7 +142,7 @@ class MonocularOdometry {
   VoResult GiveUp(const MonocularFrame& frame);
   void MeasureScale(const Eigen::Isometry3d& world_from_camera);
   void MeasureByFixes(std::int64_t stamp_ns, const Eigen::Isometry3d& step);
-  void MeasureByHeight(double height_units);
+  void MeasureByHeight(const RoadHeight& height);
   void TeachHeight(double log_metres_error, double variance);
   void HasTold(MetresSource source, double shared_sigma);
   void ForgetOldSource();
@@ -182,6 +185,7 @@ class MonocularOdometry {
   std::int64_t first_stamp_ns_ = 0;  // Of the start's first frame.
   std::int64_t lost_since_ns_ = 0;
   std::optional<MonocularFrame> last_frame_;
+  std::deque<PosedImage> recent_;  // Of the last step of the road's, in units of the map.
   Eigen::Isometry3d start_pose_ = Eigen::Isometry3d::Identity();
   Matrix6d start_covariance_ = Matrix6d::Zero();
   Eigen::Isometry3d last_unscaled_ = Eigen::Isometry3d::Identity();

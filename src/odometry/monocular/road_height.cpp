@@ -15,6 +15,22 @@ constexpr double kWidestRatio = 2.0;  // Half width of the wedge, against the he
 constexpr double kMaxTiltRad = 0.06;  // Of the plane against the wheels'.
 constexpr double kNearPlane = 0.03;   // Against the height.
 constexpr double kWorstRelativeSigma = 0.1;
+// Of a height by edges, whose plane may be a kerb's, and by one plane.
+constexpr double kEdgesSigma = 0.1;
+constexpr double kPlaneSigma = 0.03;
+// The way between the images, against the height.
+constexpr double kShortestWay = 0.25;
+constexpr double kLongestWay = 3.0;
+constexpr double kLeastAhead = 0.7;       // Of the direction of travel, along the optical axis.
+constexpr double kWideHeightRatio = 1.6;  // Of the wide search, up and down from its guess.
+constexpr double kWideRollRad = 0.03;
+
+RoadPlaneSearch::Config WideAround(RoadPlaneSearch::Config config, double height_m) {
+  config.lowest_m = height_m / kWideHeightRatio;
+  config.highest_m = height_m * kWideHeightRatio;
+  config.search_roll_rad = kWideRollRad;
+  return config;
+}
 
 /// Points on the part of the image that is mostly road: a wedge ahead of the car.
 std::vector<Eigen::Vector3d> RoadPointsAhead(const std::vector<EdgeDepth>& edges,
@@ -35,8 +51,8 @@ std::vector<Eigen::Vector3d> RoadPointsAhead(const std::vector<EdgeDepth>& edges
 
 }  // namespace
 
-std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
-                                 const geo::CameraIntrinsics& camera, double pitch_rad) {
+std::optional<double> RoadHeightOfEdges(const std::vector<EdgeDepth>& edges,
+                                        const geo::CameraIntrinsics& camera, double pitch_rad) {
   const Eigen::Vector3d down(0, std::cos(pitch_rad), std::sin(pitch_rad));
   const std::vector<Eigen::Vector3d> points = RoadPointsAhead(edges, camera, down);
   if (points.size() < kMinEdges) return std::nullopt;
@@ -74,6 +90,69 @@ std::optional<double> RoadHeight(const std::vector<EdgeDepth>& edges,
     if (std::abs(height - best_height) < kNearPlane * best_height) sum += height;
   }
   return sum / static_cast<double>(most);
+}
+
+RoadHeightMeter::RoadHeightMeter(const Config& config, const geo::CameraIntrinsics& camera)
+    : config_(config),
+      camera_(camera),
+      near_(config.plane, camera),
+      wide_(WideAround(config.plane, config.camera_height_m), camera) {}
+
+void RoadHeightMeter::Reset() {
+  units_.reset();
+  roll_rad_ = 0;
+  failures_ = 0;
+}
+
+std::optional<RoadHeight> RoadHeightMeter::Measure(const PosedImage& now, const PosedImage& before,
+                                                   const std::vector<EdgeDepth>& edges) {
+  Eigen::Isometry3d before_from_now = before.world_from_camera.inverse() * now.world_from_camera;
+  const double way_units = before_from_now.translation().norm();
+  Eigen::Vector3d forward =
+      before_from_now.linear().transpose() * before_from_now.translation() / way_units;
+  // Written so that NaN is refused.
+  if (!(forward.z() > kLeastAhead)) return std::nullopt;
+  if (config_.camera_pitch_rad) {
+    forward.y() = -std::sin(*config_.camera_pitch_rad);
+    forward.normalize();
+  }
+  const double pitch_rad = -std::asin(forward.y());
+  std::optional<double> about = units_;
+  if (!about) about = RoadHeightOfEdges(edges, camera_, pitch_rad);
+  if (!about || way_units > kLongestWay * *about) return std::nullopt;
+  const RoadHeight by_edges{*about, kEdgesSigma};
+  const bool far_enough = way_units >= kShortestWay * *about;
+  const double metres_per_unit = config_.camera_height_m / *about;
+  std::optional<RoadPlane> plane;
+  if (far_enough) {
+    now_.Build(now.smooth);
+    before_.Build(before.smooth);
+    // What is seen now was in view before, too, further ahead.
+    before_from_now.translation() *= metres_per_unit;
+    plane = FindPlane({now_, before_, before_from_now}, forward);
+  }
+  if (!plane) {
+    if (!units_) return by_edges;
+    if (far_enough && ++failures_ >= 2 * config_.max_failures) Reset();
+    return std::nullopt;
+  }
+  failures_ = 0;
+  units_ = plane->distance / metres_per_unit;
+  return RoadHeight{*units_, kPlaneSigma};
+}
+
+/// The plane in about metres; `forward` is the direction of travel as the camera sees it.
+std::optional<RoadPlane> RoadHeightMeter::FindPlane(const RoadView& view,
+                                                    const Eigen::Vector3d& forward) {
+  const Eigen::Vector3d tilted(-std::sin(roll_rad_), std::cos(roll_rad_), 0);
+  const Eigen::Vector3d down = (tilted - forward.dot(tilted) * forward).normalized();
+  Mounting guess = MountingOfAxes({forward, down});
+  guess.height_m = config_.camera_height_m;
+  const bool is_known = units_ && failures_ < config_.max_failures;
+  const std::optional<RoadPlane> plane =
+      is_known ? near_.Refine(view, guess) : wide_.Search(view, guess);
+  if (plane) roll_rad_ = -std::atan2(plane->down.x(), plane->down.y());
+  return plane;
 }
 
 }  // namespace livemap::odometry

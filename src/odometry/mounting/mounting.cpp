@@ -40,4 +40,12 @@ VehicleAxes AxesInCamera(const Mounting& mounting) {
   return {optical_from_base.col(0), -optical_from_base.col(2)};
 }
 
+Mounting MountingOfAxes(const VehicleAxes& axes) {
+  Eigen::Matrix3d base_from_optical;
+  base_from_optical.row(0) = axes.forward;
+  base_from_optical.row(1) = axes.forward.cross(axes.down);
+  base_from_optical.row(2) = -axes.down;
+  return MountingOfRotation(base_from_optical);
+}
+
 }  // namespace livemap::odometry

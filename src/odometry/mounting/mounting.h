@@ -27,4 +27,7 @@ struct VehicleAxes {
 };
 VehicleAxes AxesInCamera(const Mounting& mounting);
 
+/// The mounting that sees the axes so, which are at right angles; the height is 0.
+Mounting MountingOfAxes(const VehicleAxes& axes);
+
 }  // namespace livemap::odometry

@@ -93,11 +93,7 @@ std::optional<Mounting> MountingCalibrator::Guess() const {
   const Mounting tilt = road_guess_.value_or(config_.assumed);
   const Eigen::Vector3d seen_down = AxesInCamera(tilt).down;
   const Eigen::Vector3d down = (seen_down - forward->dot(seen_down) * *forward).normalized();
-  Eigen::Matrix3d base_from_optical;
-  base_from_optical.row(0) = *forward;
-  base_from_optical.row(1) = forward->cross(down);
-  base_from_optical.row(2) = -down;
-  Mounting mounting = MountingOfRotation(base_from_optical);
+  Mounting mounting = MountingOfAxes({*forward, down});
   mounting.height_m = tilt.height_m;
   return mounting;
 }
@@ -132,11 +128,8 @@ void MountingCalibrator::MeasureRoad(const Kept& now, const CalibrationFrame& fr
   ++figures_.planes;
   estimator_.AddRoad(*road, frame.depth_m.empty() ? frame.metres_sigma : 0);
   const Eigen::Vector3d forward = AxesInCamera(*guess).forward;
-  Eigen::Matrix3d base_from_optical;
-  base_from_optical.row(2) = -road->down;
-  base_from_optical.row(0) = (forward - forward.dot(road->down) * road->down).normalized();
-  base_from_optical.row(1) = Eigen::Vector3d(base_from_optical.row(0)).cross(road->down);
-  Mounting seen = MountingOfRotation(base_from_optical);
+  Mounting seen =
+      MountingOfAxes({(forward - forward.dot(road->down) * road->down).normalized(), road->down});
   seen.height_m = road->distance;
   road_guess_ = seen;
 }

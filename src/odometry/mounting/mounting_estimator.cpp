@@ -147,11 +147,7 @@ std::optional<MountingEstimate> MountingEstimator::EstimateOf(const Means& means
     forward = (forward - (1 - travel_share) * skew * down).normalized();
   }
   down = (down - forward.dot(down) * forward).normalized();
-  Eigen::Matrix3d base_from_optical;
-  base_from_optical.row(0) = forward;
-  base_from_optical.row(1) = forward.cross(down);
-  base_from_optical.row(2) = -down;
-  estimate.mounting = MountingOfRotation(base_from_optical);
+  estimate.mounting = MountingOfAxes({forward, down});
   estimate.mounting.height_m =
       estimate.height_known ? std::exp(means[kLogHeight].value) : otherwise.height_m;
   estimate.sigma.yaw_rad = std::sqrt(means[kTravelX].variance);

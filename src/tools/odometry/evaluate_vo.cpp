@@ -65,7 +65,9 @@ MonocularOptions ReadMonocularVo(const CommandLine& line) {
   options.scale_source = odometry::ParseScaleSource(line.Text("scale", "speed"));
   options.speed_sigma_mps = line.Number("speed-sigma", 0, 0, 100);
   options.camera_height_m = line.Number("camera-height", options.camera_height_m, 0.01, 100);
-  options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
+  if (line.Has("camera-pitch")) {
+    options.camera_pitch_rad = line.Number("camera-pitch", 0, -1, 1);
+  }
   options.seed = line.Seed("seed", options.seed);
   if (line.Has("mounting")) {
     const std::string path = line.Text("mounting", "");
@@ -149,7 +151,8 @@ std::optional<Options> ParseEvaluateVoOptions(int argc, char** argv) {
         "height"},
        {"speed-sigma", "M/S", "of --scale speed: noise added to the speed, default 0"},
        {"camera-height", "M", "of --scale height: over the road, default 1.65"},
-       {"camera-pitch", "RAD", "of --scale height: positive looks down, default 0"},
+       {"camera-pitch", "RAD",
+        "of --scale height: positive looks down, default: as it sees the direction of travel"},
        {"mounting", "FILE",
         "of --scale height: height and pitch as livemap evaluate mounting --out found them"},
        {"seed", "N", "of the speed's noise, default 1"},

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "datasets/sequences.h"
 #include "odometry/monocular/monocular_odometry.h"
@@ -16,8 +17,9 @@ struct MonocularOptions {
   double speed_sigma_mps = 0;  ///< Noise added to the true speed, standard deviation.
   std::uint64_t seed = 1;      ///< Of that noise.
   double camera_height_m = 1.65;
-  double camera_pitch_rad = 0;  ///< Positive looks down.
-  int keyframe_delay = 0;       ///< Frames until a keyframe is taken over, as on board.
+  /// Positive looks down; none: as it sees the direction of travel.
+  std::optional<double> camera_pitch_rad{};
+  int keyframe_delay = 0;  ///< Frames until a keyframe is taken over, as on board.
 };
 
 /// Follows the sequence, of which every `step`th frame comes, by monocular odometry; depth is not

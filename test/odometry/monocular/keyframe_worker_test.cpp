@@ -50,7 +50,7 @@ TEST(KeyframeWorker, LearnsOnItsThreadWhatTheFramesThreadWouldLearn) {
     EXPECT_FALSE(worker.busy());
     EXPECT_EQ(made->order.stamp_ns, i);
     const KeyframeWorker::Order order = WorkerOrder(x_m, i);
-    const LearntDepths learnt = within.Learn(order.smooth, order.result.world_from_camera, 1);
+    const LearntDepths learnt = within.Learn({order.smooth, order.result.world_from_camera}, 1, {});
     EXPECT_EQ(cv::norm(made->learnt.depth, learnt.depth, cv::NORM_INF), 0);
     EXPECT_GT(cv::countNonZero(learnt.depth > 0), 100);
   }

@@ -6,8 +6,6 @@
 #include <limits>
 #include <random>
 
-#include "odometry/monocular/road_height.h"
-
 namespace livemap::odometry {
 namespace {
 
@@ -53,45 +51,6 @@ TEST(MetricScale, IgnoresWhatIsNotANumberOrNotPositive) {
   }
   scale.Measure(1, nan, 1);
   EXPECT_FALSE(scale.log_sigma());
-}
-
-constexpr geo::CameraIntrinsics kRoadCamera{500, 500, 319.5, 239.5, 640, 480};
-
-/// Edges of a road under a camera that looks down a little, and as many of other things.
-std::vector<EdgeDepth> RoadAndOtherThings(double height, double pitch_rad) {
-  std::mt19937 random(3);
-  std::uniform_int_distribution<int> u(100, 540), v(290, 470);
-  std::uniform_real_distribution<float> other(0.02F, 0.5F);
-  std::normal_distribution<double> noise(0, 0.01);
-  std::vector<EdgeDepth> edges;
-  for (int i = 0; i < 600; ++i) {
-    EdgeDepth edge;
-    edge.u = static_cast<std::int16_t>(u(random));
-    edge.v = static_cast<std::int16_t>(v(random));
-    edge.known = true;
-    const double slope =
-        (edge.v - kRoadCamera.cy) / kRoadCamera.fy * std::cos(pitch_rad) + std::sin(pitch_rad);
-    edge.inverse_depth =
-        i % 2 == 0 ? static_cast<float>(slope / height * (1 + noise(random))) : other(random);
-    edge.variance = 1e-4F * edge.inverse_depth * edge.inverse_depth;
-    edges.push_back(edge);
-  }
-  return edges;
-}
-
-TEST(RoadHeight, IsThatOfTheRoadAmongOtherThings) {
-  for (const double pitch_rad : {0.0, 0.1}) {
-    const auto height = RoadHeight(RoadAndOtherThings(1.5, pitch_rad), kRoadCamera, pitch_rad);
-    ASSERT_TRUE(height);
-    EXPECT_NEAR(*height, 1.5, 0.03);
-  }
-}
-
-TEST(RoadHeight, IsNotKnownWithoutARoad) {
-  std::vector<EdgeDepth> edges = RoadAndOtherThings(1.5, 0);
-  for (std::size_t i = 0; i < edges.size(); i += 2) edges[i].known = false;
-  EXPECT_FALSE(RoadHeight(edges, kRoadCamera, 0));
-  EXPECT_FALSE(RoadHeight({}, kRoadCamera, 0));
 }
 
 TEST(MetricScale, StretchesWhatHasMeasuredItWrongly) {

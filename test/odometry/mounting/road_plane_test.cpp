@@ -38,6 +38,10 @@ TEST(Mounting, AnglesGoToARotationAndBack) {
   EXPECT_NEAR(back.yaw_rad, kPlaneTruth.yaw_rad, 1e-12);
   EXPECT_NEAR(back.pitch_rad, kPlaneTruth.pitch_rad, 1e-12);
   EXPECT_NEAR(back.roll_rad, kPlaneTruth.roll_rad, 1e-12);
+  const Mounting of_axes = MountingOfAxes(AxesInCamera(kPlaneTruth));
+  EXPECT_NEAR(of_axes.yaw_rad, kPlaneTruth.yaw_rad, 1e-12);
+  EXPECT_NEAR(of_axes.pitch_rad, kPlaneTruth.pitch_rad, 1e-12);
+  EXPECT_NEAR(of_axes.roll_rad, kPlaneTruth.roll_rad, 1e-12);
   const VehicleAxes level = AxesInCamera({});
   EXPECT_NEAR(level.forward.z(), 1, 1e-12);
   EXPECT_NEAR(level.down.y(), 1, 1e-12);
