@@ -1,11 +1,14 @@
 #include "region/neighbours.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/time.h"
+#include "geo/geo_box.h"
 #include "region/zone_list.h"
 
 namespace livemap::region {
@@ -37,6 +40,34 @@ bool HasCornerNear(const directory::ZoneArea& area, const directory::ZoneArea& o
 /// nothing there.
 bool MayBeNear(const directory::ZoneArea& a, const directory::ZoneArea& b, double margin_m) {
   return a.MayOverlap(b) || HasCornerNear(a, b, margin_m) || HasCornerNear(b, a, margin_m);
+}
+
+/// The smallest box with all places that lie within `radius_m` of one of these hazards, of which
+/// there is at least one; all longitudes where it would cross the antimeridian.
+geo::GeoBox BoxAround(const std::deque<zone::Hazard>& hazards, double radius_m) {
+  // A little less than the ellipsoid has anywhere, so that the box is rather too large.
+  constexpr double kLeastMetresPerDegree = 110'500;
+  geo::GeoBox box{hazards.front().position, hazards.front().position};
+  auto& [south_west, north_east] = box;
+  for (const zone::Hazard& hazard : hazards) {
+    const auto& [latitude_deg, longitude_deg] = hazard.position;
+    south_west.latitude_deg = std::min(south_west.latitude_deg, latitude_deg);
+    south_west.longitude_deg = std::min(south_west.longitude_deg, longitude_deg);
+    north_east.latitude_deg = std::max(north_east.latitude_deg, latitude_deg);
+    north_east.longitude_deg = std::max(north_east.longitude_deg, longitude_deg);
+  }
+  const double margin_deg = radius_m / kLeastMetresPerDegree;
+  south_west.latitude_deg -= margin_deg;
+  north_east.latitude_deg += margin_deg;
+  const double poleward_deg = std::max(-south_west.latitude_deg, north_east.latitude_deg);
+  const double narrowing = std::cos(std::min(poleward_deg, 90.0) * geo::kRadiansPerDegree);
+  south_west.longitude_deg -= margin_deg / narrowing;
+  north_east.longitude_deg += margin_deg / narrowing;
+  if (!(south_west.longitude_deg >= -180 && north_east.longitude_deg <= 180)) {
+    south_west.longitude_deg = -180;
+    north_east.longitude_deg = 180;
+  }
+  return box;
 }
 
 }  // namespace
@@ -112,6 +143,7 @@ protocol::DuplicateFilter Neighbours::OwnAround(const std::deque<zone::Hazard>& 
   protocol::DuplicateFilter own(catalogue_);
   if (hazards.empty()) return own;
   zone::Walk<zone::HazardState> walk;
+  walk.box = BoxAround(hazards, catalogue_.MaxDuplicateRadiusM());
   walk.states = zone::StatesOnMap();
   walk.until = zone_.Sequence();
   for (bool is_last = false; !is_last;) {

@@ -61,7 +61,7 @@ class Neighbours : public web::NeighbourReader {
  private:
   std::vector<RegionZone> ZonesAround(const directory::ZoneDirectory& directory) const;
   std::vector<web::NeighbourHazard> Read() const REQUIRES_SHARED(mutex_);
-  /// All that drivers know and this zone holds; nothing where there are no `hazards` to compare.
+  /// What drivers know and this zone holds where one of these `hazards` may be the same.
   protocol::DuplicateFilter OwnAround(const std::deque<zone::Hazard>& hazards) const;
 
   const Config config_;

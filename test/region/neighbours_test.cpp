@@ -147,6 +147,22 @@ TEST_F(NeighboursTest, OneThatBothHoldIsOwnAndOneOfAnotherClassIsNot) {
   EXPECT_EQ(neighbours_->Hazards()[0].hazard.uuid, other);
 }
 
+TEST_F(NeighboursTest, AnOwnOneOnAnySideOfTheOthersIsTheSame) {
+  PutDirectory(1, SouthUrl());
+  // The distances of two potholes, 20 m apart, from an own one each: 3 m west and 3 m east.
+  const auto on_border = [](double east_m) {
+    return geo::GeoPoint{kBorderDeg, kLongitudeDeg + east_m / 84'500};
+  };
+  Add(south_, on_border(0));
+  Add(south_, on_border(20));
+  const Uuid alone = Add(south_, SouthOfBorder(100));
+  Add(north_, on_border(-3));
+  Add(north_, on_border(23));
+  Follow();
+  ASSERT_TRUE(ComeToBe(1));
+  EXPECT_EQ(neighbours_->Hazards()[0].hazard.uuid, alone);
+}
+
 TEST_F(NeighboursTest, AfterTheOwnOneIsGoneTheOthersIsShown) {
   PutDirectory(1, SouthUrl());
   const Uuid own = Add(north_, NorthOfBorder(1));
