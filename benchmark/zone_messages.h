@@ -3,8 +3,10 @@
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -49,6 +51,7 @@ Message Open(const transport::MqttMessage& message) {
 inline std::string PasswordOf(const std::string& path) {
   std::ifstream file(path);
   std::string password;
+  if (!file) throw Error("'" + path + "' cannot be opened: " + std::strerror(errno));
   if (!std::getline(file, password)) throw Error("no password in '" + path + "'");
   return password;
 }

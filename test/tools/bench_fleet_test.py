@@ -4,6 +4,8 @@
     bench_fleet_test.py SCRIPT
 """
 
+import importlib.machinery
+import importlib.util
 import json
 import os
 import pathlib
@@ -17,6 +19,14 @@ ROOT = SCRIPT.parents[1]
 sys.path.insert(0, str(SCRIPT.parent / "lib"))
 import city_traffic  # noqa: E402
 from system_error import StartError  # noqa: E402
+
+
+def the_script():
+    """The script as a module."""
+    loader = importlib.machinery.SourceFileLoader("livemap_bench_fleet", str(SCRIPT))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
 
 
 def bench(*flags):
@@ -49,6 +59,14 @@ class BenchFleetTest(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         fleet, = json.loads(done.stdout)["fleets"]
         self.assertEqual((fleet["connected"], fleet["cells_told"]), (20, 0))
+
+    def test_the_sum_on_paper_stands_beside_what_a_larger_fleet_took(self):
+        def fleet(vehicles, cores, bits):
+            return {"vehicles": vehicles, "cores": dict.fromkeys(("broker", "bridge", "zone"), cores),
+                    "notice_bit_s": bits, "near_notice_bit_s": bits / 2}
+        lines = the_script().paper_checked(fleet(1000, 0.1, 60), fleet(5000, 0.3, 250))
+        self.assertIn("| cores of the zone | 0.50 | 0.30 |", lines)
+        self.assertIn("| notices, kbit/s down of one vehicle | 0.30 | 0.25 |", lines)
 
     def test_a_wrong_number_of_vehicles_is_one_sentence(self):
         done = bench("--vehicles", "0")
