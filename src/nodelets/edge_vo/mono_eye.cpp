@@ -1,5 +1,8 @@
 #include "nodelets/edge_vo/mono_eye.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace livemap::nodelets {
 namespace {
 
@@ -7,6 +10,8 @@ odometry::MonocularOdometry::Config WithMounting(odometry::MonocularOdometry::Co
                                                  const Eigen::Isometry3d& base_from_optical) {
   config.scale_source = odometry::ScaleSource::kBest;
   config.camera_height_m = base_from_optical.translation().z();
+  const double up = base_from_optical.linear().col(2).z();  // Of where the camera looks.
+  config.camera_pitch_rad = -std::asin(std::clamp(up, -1.0, 1.0));
   return config;
 }
 

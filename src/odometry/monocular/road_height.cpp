@@ -108,15 +108,11 @@ std::optional<RoadHeight> RoadHeightMeter::Measure(const PosedImage& now, const 
                                                    const std::vector<EdgeDepth>& edges) {
   Eigen::Isometry3d before_from_now = before.world_from_camera.inverse() * now.world_from_camera;
   const double way_units = before_from_now.translation().norm();
-  Eigen::Vector3d forward =
+  const Eigen::Vector3d forward =
       before_from_now.linear().transpose() * before_from_now.translation() / way_units;
   // Written so that NaN is refused.
   if (!(forward.z() > kLeastAhead)) return std::nullopt;
-  if (config_.camera_pitch_rad) {
-    forward.y() = -std::sin(*config_.camera_pitch_rad);
-    forward.normalize();
-  }
-  const double pitch_rad = -std::asin(forward.y());
+  const double pitch_rad = config_.camera_pitch_rad.value_or(-std::asin(forward.y()));
   std::optional<double> about = units_;
   if (!about) about = RoadHeightOfEdges(edges, camera_, pitch_rad);
   if (!about || way_units > kLongestWay * *about) return std::nullopt;

@@ -37,7 +37,8 @@ class RoadHeightMeter {
     RoadPlaneSearch::Config plane;
     /// About how high the camera is, m: which part of the image is the lane.
     double camera_height_m = 1.6;
-    /// Positive looks down; none: that at which it sees the direction of travel.
+    /// For the edges, positive looks down; none: that at which it sees the direction of travel, by
+    /// which the lane's plane is found in any case.
     std::optional<double> camera_pitch_rad{};
     /// So many planes in a row that were not found, and the plane is searched widely; twice as
     /// many, and anew from the edges.

@@ -123,11 +123,14 @@ TEST_F(RoadHeightMeterTest, WhereThePlaneIsLostForLongItBeginsAnew) {
   EXPECT_NEAR(by_edges->units / kUnitsPerMetre, 1.2 * kMeterTruth.height_m, 0.03);
 }
 
-TEST_F(RoadHeightMeterTest, TakesThePitchThatIsStated) {
+TEST_F(RoadHeightMeterTest, APitchThatIsStatedWronglyMisleadsTheEdgesAlone) {
   RoadHeightMeter::Config config;
-  config.camera_pitch_rad = kMeterTruth.pitch_rad;
+  config.camera_pitch_rad = kMeterTruth.pitch_rad - Radians(8);
   RoadHeightMeter stated(config, kRoadEye);
-  ExpectTruth(stated.Measure(At(1.2), At(0), Edges(1.1)));
+  EXPECT_FALSE(stated.Measure(At(1.2), At(0), Edges(1))) << "no edges lie on such a plane";
+  config.camera_pitch_rad = kMeterTruth.pitch_rad - Radians(2);
+  RoadHeightMeter nearly(config, kRoadEye);
+  ExpectTruth(nearly.Measure(At(1.2), At(0), Edges(1)));
 }
 
 }  // namespace
