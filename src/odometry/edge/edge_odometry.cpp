@@ -156,6 +156,11 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
   return true;
 }
 
+void EdgeOdometry::Correct(const Eigen::Isometry3d& said_from_true, double since_s) {
+  last_.world_from_camera = last_.world_from_camera * said_from_true;
+  if (last_.twist) *last_.twist += Se3Log(said_from_true) / since_s;
+}
+
 bool EdgeOdometry::AddEarlierKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
                                       const VoResult& result) {
   frame_images_.Build(frame.grey);

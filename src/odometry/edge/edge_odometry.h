@@ -147,6 +147,10 @@ class EdgeOdometry {
   bool AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_depth_sigma,
                    const std::optional<Vector6d>& twist);
 
+  /// Track() was wrong about the last frame: the camera is where this brings it, and the motion of
+  /// the last `since_s` was as wrong.
+  void Correct(const Eigen::Isometry3d& said_from_true, double since_s);
+
   /// Makes a frame that was followed before the last one a keyframe, when it gets its depth later:
   /// its picture, stamp and depth (CV_32FC1), the standard deviations as above, and what Track()
   /// said of it. Called between two frames; images() is not valid until the next one. False, and

@@ -11,7 +11,8 @@ DepthLearner::DepthLearner(const Config& config, const geo::CameraIntrinsics& ca
     : config_(config),
       extractor_(config.edges),
       map_(config.depth, camera),
-      road_(config.road, camera) {
+      road_(config.road, camera),
+      corners_(config.corners, camera) {
   if (config.views_kept < 1 || config.views_kept > 100) {
     throw Error("views_kept is " + std::to_string(config.views_kept) + "; 1 to 100 is accepted");
   }
@@ -30,8 +31,17 @@ void DepthLearner::Restart(const cv::Mat& smooth, const Eigen::Isometry3d& world
 
 /// From the last keyframes' depths and from where the earlier keyframes see the new edges: the
 /// newest view, which is the nearest, first.
-LearntDepths DepthLearner::Learn(const PosedImage& now, double metres_per_unit,
+LearntDepths DepthLearner::Learn(const PosedImage& said, double metres_per_unit,
                                  const PosedImage& before) {
+  LearntDepths learnt;
+  PosedImage now = said;
+  const PosedImage& last = views_.back();
+  const std::optional<Eigen::Isometry3d> now_from_last = corners_.Contradicting(
+      last.smooth, now.smooth, now.world_from_camera.inverse() * last.world_from_camera);
+  if (now_from_last) {
+    now.world_from_camera = last.world_from_camera * now_from_last->inverse();
+    learnt.said_from_true = said.world_from_camera.inverse() * now.world_from_camera;
+  }
   map_.SetRange(static_cast<double>(config_.depth.min_depth_m) / metres_per_unit,
                 static_cast<double>(config_.depth.max_depth_m) / metres_per_unit);
   map_.MoveTo(extractor_.Extract(now.smooth),
@@ -42,8 +52,7 @@ LearntDepths DepthLearner::Learn(const PosedImage& now, double metres_per_unit,
                  view == views_.rbegin());
   }
   map_.Regularise();
-  LearntDepths learnt;
-  if (config_.finds_road && !before.smooth.empty()) {
+  if (config_.finds_road && !before.smooth.empty() && !now_from_last) {
     learnt.road_height = road_.Measure(now, before, map_.edges());
   }
   if (views_.size() >= static_cast<std::size_t>(config_.views_kept)) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "odometry/edge/edge_extractor.h"
+#include "odometry/monocular/corner_motion.h"
 #include "odometry/monocular/inverse_depth_map.h"
 #include "odometry/monocular/road_height.h"
 
@@ -17,6 +18,9 @@ struct LearntDepths {
   cv::Mat inverse_depth_sigma;  ///< Same places: InverseDepthMap::SigmaImage.
   /// Of the camera over the road, where that was asked for.
   std::optional<RoadHeight> road_height{};
+  /// Where corners contradict the motion from the last keyframe: the true camera, as the one that
+  /// was said sees it.
+  std::optional<Eigen::Isometry3d> said_from_true{};
 };
 
 /// Learns the inverse depths on the edges of one keyframe after another, from where the last
@@ -30,6 +34,7 @@ class DepthLearner {
     int views_kept = 4;
     bool finds_road = false;  ///< Whether LearntDepths::road_height is looked for.
     RoadHeightMeter::Config road;
+    CornerCheck::Config corners;
   };
 
   /// Throws Error when the configuration is wrong.
@@ -51,6 +56,7 @@ class DepthLearner {
   EdgeExtractor extractor_;
   InverseDepthMap map_;
   RoadHeightMeter road_;
+  CornerCheck corners_;
   std::deque<PosedImage> views_;  // Keyframes, newest last: the present one.
 };
 

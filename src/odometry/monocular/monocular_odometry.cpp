@@ -397,13 +397,19 @@ VoResult MonocularOdometry::Continue(const MonocularFrame& frame) {
 }
 
 /// Makes the present frame a keyframe, or has it made.
-bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled) {
+bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, VoResult& unscaled) {
   const double scale = scale_.metres_per_unit();
   PosedImage before = recent_.empty() ? PosedImage{} : recent_.front();
   if (!worker_) {
     const LearntDepths learnt =
         learner_.Learn({odometry_.images()[0], unscaled.world_from_camera}, scale, before);
     OnLearnt(learnt);
+    if (learnt.said_from_true) {
+      const double since_s = Seconds(frame.stamp_ns - odometry_.keyframe()->stamp_ns);
+      odometry_.Correct(*learnt.said_from_true, since_s);
+      unscaled.world_from_camera = unscaled.world_from_camera * *learnt.said_from_true;
+      if (unscaled.twist) *unscaled.twist += Se3Log(*learnt.said_from_true) / since_s;
+    }
     return odometry_.AddKeyframe(learnt.depth, learnt.inverse_depth_sigma, unscaled.twist);
   }
   if (worker_->busy()) return false;
@@ -418,10 +424,18 @@ bool MonocularOdometry::MakeKeyframe(const MonocularFrame& frame, const VoResult
 bool MonocularOdometry::TakeKeyframe() {
   if (!worker_) return false;
   const bool late = Seconds(now_ns_ - ordered_ns_) > config_.longest_keyframe_s;
-  const std::optional<KeyframeWorker::Made> made =
+  std::optional<KeyframeWorker::Made> made =
       late ? worker_->WaitAndTake(config_.longest_wait_s) : worker_->Take();
   if (!made) return false;
   OnLearnt(made->learnt);
+  if (const auto& said_from_true = made->learnt.said_from_true) {
+    // The last frame is moved in the world as the keyframe is.
+    Eigen::Isometry3d& pose = made->order.result.world_from_camera;
+    const Eigen::Isometry3d keyframe_from_last = pose.inverse() * last_unscaled_;
+    odometry_.Correct(keyframe_from_last.inverse() * *said_from_true * keyframe_from_last,
+                      Seconds(made->order.stamp_ns - odometry_.keyframe()->stamp_ns));
+    pose = pose * *said_from_true;
+  }
   return odometry_.AddEarlierKeyframe(
       {made->order.stamp_ns, made->order.grey, made->learnt.depth, 1},
       made->learnt.inverse_depth_sigma, made->order.result);

@@ -130,7 +130,7 @@ class MonocularOdometry {
   void BeginStart(const MonocularFrame& frame);
   bool MakeFirstKeyframe(const Eigen::Isometry3d& first_from_new,
                          const std::optional<Vector6d>& twist);
-  bool MakeKeyframe(const MonocularFrame& frame, const VoResult& unscaled);
+  bool MakeKeyframe(const MonocularFrame& frame, VoResult& unscaled);
   bool TakeKeyframe();
   void OnLearnt(const LearntDepths& learnt);
   void Remember(const Eigen::Isometry3d& world_from_camera);

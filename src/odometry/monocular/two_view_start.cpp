@@ -7,16 +7,14 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
-#include "odometry/se3.h"
+#include "odometry/monocular/corner_motion.h"
 
 namespace livemap::odometry {
 namespace {
 
 constexpr double kCornerQuality = 0.005;
 constexpr double kCornerDistancePx = 8;
-constexpr float kThereAndBackPx = 1.0F;
 constexpr double kConfidence = 0.9999;
 
 /// The 95 % quantile of chi-square with two degrees of freedom. If half of the corners are further
@@ -28,11 +26,6 @@ constexpr int kImagesThatTell = 2;
 constexpr double kMuchLonger = 1.5;
 /// A refuted start needs a baseline that is longer at all.
 constexpr double kLonger = 1.2;
-
-Eigen::Vector3d StartRayOf(const cv::Point2f& pixel, const geo::CameraIntrinsics& camera) {
-  return {(static_cast<double>(pixel.x) - camera.cx) / camera.fx,
-          (static_cast<double>(pixel.y) - camera.cy) / camera.fy, 1};
-}
 
 /// By how much a point moves over the image for each unit of its inverse depth, px.
 Eigen::Vector2d LineOf(const Eigen::Vector3d& seen, const Eigen::Vector3d& translation,
@@ -62,17 +55,8 @@ void TwoViewStart::Begin(const cv::Mat& grey) {
 
 void TwoViewStart::FollowCorners(const cv::Mat& grey) {
   if (end_.empty()) return;
-  std::vector<cv::Point2f> now, back;
-  std::vector<std::uint8_t> found, found_back;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(last_, grey, end_, now, found, error);
-  cv::calcOpticalFlowPyrLK(grey, last_, now, back, found_back, error);
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const cv::Point2f way = back[i] - end_[i];
-    const bool same = std::hypot(way.x, way.y) <= kThereAndBackPx;
-    found[i] = found[i] != 0 && found_back[i] != 0 && same ? 1 : 0;
-  }
-  KeepFollowed(now, found);
+  const FollowedCorners followed = odometry::FollowCorners(last_, grey, end_);
+  KeepFollowed(followed.now, followed.found);
   grey.copyTo(last_);
 }
 
@@ -147,8 +131,8 @@ double TwoViewStart::MedianMiss(const Eigen::Isometry3d& new_from_first) const {
   const double variance = config_.pixel_sigma * config_.pixel_sigma;
   std::vector<double> misses;
   for (std::size_t i = 0; i < begin_.size(); ++i) {
-    const Eigen::Vector3d first = StartRayOf(begin_[i], camera_);
-    const Eigen::Vector3d second = StartRayOf(second_[i], camera_);
+    const Eigen::Vector3d first = RayOfCorner(begin_[i], camera_);
+    const Eigen::Vector3d second = RayOfCorner(second_[i], camera_);
     // The inverse depth that brings the corner nearest to its place in the second image.
     const Eigen::Vector3d at_infinity = second_from_first_.linear() * first;
     const Eigen::Vector3d& move = second_from_first_.translation();
@@ -162,7 +146,7 @@ double TwoViewStart::MedianMiss(const Eigen::Isometry3d& new_from_first) const {
       continue;
     }
     const Eigen::Vector2d miss =
-        focal_px * (StartRayOf(end_[i], camera_).hnormalized() - seen.hnormalized());
+        focal_px * (RayOfCorner(end_[i], camera_).hnormalized() - seen.hnormalized());
     const Eigen::Vector2d line = LineOf(seen, new_from_first.translation(), focal_px);
     const Eigen::Matrix2d covariance =
         2 * variance *
@@ -204,16 +188,16 @@ double TwoViewStart::MedianParallaxPx() const {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     for (std::size_t i = 0; i < begin_.size(); ++i) {
       if (left[i] > limit_px) continue;
-      sum += StartRayOf(end_[i], camera_).normalized() *
-             StartRayOf(begin_[i], camera_).normalized().transpose();
+      sum += RayOfCorner(end_[i], camera_).normalized() *
+             RayOfCorner(begin_[i], camera_).normalized().transpose();
     }
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Matrix3d handed = Eigen::Matrix3d::Identity();
     handed(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
     const Eigen::Matrix3d turn = svd.matrixU() * handed * svd.matrixV().transpose();
     for (std::size_t i = 0; i < begin_.size(); ++i) {
-      const Eigen::Vector3d seen = turn * StartRayOf(begin_[i], camera_);
-      const Eigen::Vector3d now = StartRayOf(end_[i], camera_);
+      const Eigen::Vector3d seen = turn * RayOfCorner(begin_[i], camera_);
+      const Eigen::Vector3d now = RayOfCorner(end_[i], camera_);
       left[i] = camera_.fx * (seen.hnormalized() - now.hnormalized()).norm();
     }
     std::vector<double> ways = left;
@@ -244,68 +228,8 @@ std::optional<Eigen::Isometry3d> TwoViewStart::Motion() const {
     new_from_first.translation()[row] = translation[row];
   }
   if (!new_from_first.matrix().allFinite()) return std::nullopt;
-  Refine(new_from_first);
+  RefineByCorners({begin_, end_}, camera_, config_.inlier_px, new_from_first);
   return new_from_first;
-}
-
-/// First-order geometric errors of all corners against the epipolar constraint, px (Hartley and
-/// Zisserman 2004, equation 11.9).
-Eigen::VectorXd TwoViewStart::SampsonErrors(const Eigen::Isometry3d& new_from_first) const {
-  const Eigen::Matrix3d essential =
-      CrossMatrix(new_from_first.translation()) * new_from_first.linear();
-  Eigen::VectorXd errors(static_cast<Eigen::Index>(begin_.size()));
-  for (std::size_t i = 0; i < begin_.size(); ++i) {
-    const Eigen::Vector3d first = StartRayOf(begin_[i], camera_),
-                          now = StartRayOf(end_[i], camera_);
-    const Eigen::Vector3d line = essential * first;
-    const Eigen::Vector3d line_back = essential.transpose() * now;
-    const double slope =
-        std::sqrt(line.head<2>().squaredNorm() + line_back.head<2>().squaredNorm());
-    errors[static_cast<Eigen::Index>(i)] = camera_.fx * now.dot(line) / slope;
-  }
-  return errors;
-}
-
-/// Gauss-Newton with Huber weights over the rotation and the translation's direction.
-void TwoViewStart::Refine(Eigen::Isometry3d& new_from_first) const {
-  constexpr int kUnknowns = 5;
-  constexpr double kStep = 1e-6;
-  const auto moved = [](const Eigen::Isometry3d& from, const Eigen::Matrix<double, 5, 1>& delta) {
-    const Eigen::Vector3d t = from.translation();
-    const Eigen::Vector3d side = t.unitOrthogonal();
-    Vector6d turn = Vector6d::Zero();
-    turn.tail<3>() = delta.head<3>();
-    Eigen::Isometry3d to = from;
-    to.linear() = from.linear() * Se3Exp(turn).linear();
-    to.translation() = (t + delta[3] * side + delta[4] * t.cross(side)).normalized();
-    return to;
-  };
-  const auto cost = [&](const Eigen::VectorXd& errors) {
-    const Eigen::ArrayXd size = errors.array().abs();
-    const Eigen::ArrayXd clipped = size.min(config_.inlier_px);
-    return (clipped * (2 * size - clipped)).sum();
-  };
-  Eigen::VectorXd errors = SampsonErrors(new_from_first);
-  for (int iteration = 0; iteration < 20; ++iteration) {
-    Eigen::Matrix<double, Eigen::Dynamic, kUnknowns> jacobian(errors.size(), kUnknowns);
-    for (int i = 0; i < kUnknowns; ++i) {
-      const Eigen::Matrix<double, kUnknowns, 1> delta =
-          kStep * Eigen::Matrix<double, kUnknowns, 1>::Unit(i);
-      jacobian.col(i) = (SampsonErrors(moved(new_from_first, delta)) - errors) / kStep;
-    }
-    const Eigen::VectorXd weights =
-        (config_.inlier_px / errors.array().abs().max(config_.inlier_px)).matrix();
-    const Eigen::Matrix<double, kUnknowns, kUnknowns> normal =
-        jacobian.transpose() * weights.asDiagonal() * jacobian;
-    const Eigen::Matrix<double, kUnknowns, 1> step =
-        normal.ldlt().solve(jacobian.transpose() * weights.asDiagonal() * errors);
-    if (!step.allFinite()) return;
-    const Eigen::Isometry3d candidate = moved(new_from_first, -step);
-    const Eigen::VectorXd candidate_errors = SampsonErrors(candidate);
-    if (!(cost(candidate_errors) < cost(errors))) return;
-    new_from_first = candidate;
-    errors = candidate_errors;
-  }
 }
 
 }  // namespace livemap::odometry

@@ -99,8 +99,6 @@ class TwoViewStart {
   double MedianMiss(const Eigen::Isometry3d& new_from_first) const;
   std::optional<Eigen::Isometry3d> Motion() const;
   void TakePair(const Eigen::Isometry3d& second_from_first);
-  void Refine(Eigen::Isometry3d& new_from_first) const;
-  Eigen::VectorXd SampsonErrors(const Eigen::Isometry3d& new_from_first) const;
 
   Config config_;
   geo::CameraIntrinsics camera_;
