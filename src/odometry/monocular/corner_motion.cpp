@@ -12,7 +12,7 @@ namespace {
 constexpr float kThereAndBackPx = 1.0F;
 constexpr double kCheckedCornerQuality = 0.005;
 constexpr double kCheckedCornerDistancePx = 12;
-constexpr double kShortestWay = 1e-6;  // Of a motion that has a direction.
+constexpr double kLeastMotion = 1e-6;  // Of a motion that has a direction.
 
 /// Huber's, of which large errors do not matter much.
 double RobustSum(const Eigen::VectorXd& errors, double inlier_px) {
@@ -107,7 +107,7 @@ void RefineByCorners(const CornerPairs& corners, const geo::CameraIntrinsics& ca
 std::optional<Eigen::Isometry3d> CornerCheck::Contradicting(
     const cv::Mat& before, const cv::Mat& now, const Eigen::Isometry3d& now_from_before) const {
   // Written so that NaN is refused.
-  if (!(now_from_before.translation().norm() > kShortestWay)) return std::nullopt;
+  if (!(now_from_before.translation().norm() > kLeastMotion)) return std::nullopt;
   std::vector<cv::Point2f> corners;
   cv::goodFeaturesToTrack(before, corners, config_.corners, kCheckedCornerQuality,
                           kCheckedCornerDistancePx);

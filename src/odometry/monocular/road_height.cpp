@@ -19,8 +19,8 @@ constexpr double kWorstRelativeSigma = 0.1;
 constexpr double kEdgesSigma = 0.1;
 constexpr double kPlaneSigma = 0.03;
 // The way between the images, against the height.
-constexpr double kShortestWay = 0.25;
-constexpr double kLongestWay = 3.0;
+constexpr double kShortestRoadWay = 0.25;
+constexpr double kLongestRoadWay = 3.0;
 constexpr double kLeastAhead = 0.7;       // Of the direction of travel, along the optical axis.
 constexpr double kWideHeightRatio = 1.6;  // Of the wide search, up and down from its guess.
 constexpr double kWideRollRad = 0.03;
@@ -115,9 +115,9 @@ std::optional<RoadHeight> RoadHeightMeter::Measure(const PosedImage& now, const 
   const double pitch_rad = config_.camera_pitch_rad.value_or(-std::asin(forward.y()));
   std::optional<double> about = units_;
   if (!about) about = RoadHeightOfEdges(edges, camera_, pitch_rad);
-  if (!about || way_units > kLongestWay * *about) return std::nullopt;
+  if (!about || way_units > kLongestRoadWay * *about) return std::nullopt;
   const RoadHeight by_edges{*about, kEdgesSigma};
-  const bool far_enough = way_units >= kShortestWay * *about;
+  const bool far_enough = way_units >= kShortestRoadWay * *about;
   const double metres_per_unit = config_.camera_height_m / *about;
   std::optional<RoadPlane> plane;
   if (far_enough) {
