@@ -36,8 +36,12 @@ LearntDepths DepthLearner::Learn(const PosedImage& said, double metres_per_unit,
   LearntDepths learnt;
   PosedImage now = said;
   const PosedImage& last = views_.back();
-  const std::optional<Eigen::Isometry3d> now_from_last = corners_.Contradicting(
-      last.smooth, now.smooth, now.world_from_camera.inverse() * last.world_from_camera);
+  // The first motion is of corners itself, and verified by more of them.
+  std::optional<Eigen::Isometry3d> now_from_last;
+  if (views_.size() > 1) {
+    now_from_last = corners_.Contradicting(
+        last.smooth, now.smooth, now.world_from_camera.inverse() * last.world_from_camera);
+  }
   if (now_from_last) {
     now.world_from_camera = last.world_from_camera * now_from_last->inverse();
     learnt.said_from_true = said.world_from_camera.inverse() * now.world_from_camera;
