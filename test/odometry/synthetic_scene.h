@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -41,6 +42,27 @@ inline Eigen::Isometry3d Pose(double x, double y, double z, double roll, double 
                    Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
                       .toRotationMatrix();
   return pose;
+}
+
+/// The depth that a camera measures of the corner of two walls with the floor.
+inline cv::Mat DepthOfCorner(const Eigen::Isometry3d& world_from_camera) {
+  cv::Mat depth(kWallCamera.height, kWallCamera.width, CV_32FC1);
+  const Eigen::Vector3d walls(1, 0.8, 3);  // x, y and z of the wall that faces along it.
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const Eigen::Vector3d ray =
+          world_from_camera.linear() * Eigen::Vector3d((u - kWallCamera.cx) / kWallCamera.fx,
+                                                       (v - kWallCamera.cy) / kWallCamera.fy, 1);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (int i = 0; i < 3; ++i) {
+        if (ray[i] > 0) {
+          nearest = std::min(nearest, (walls[i] - world_from_camera.translation()[i]) / ray[i]);
+        }
+      }
+      depth.at<float>(v, u) = static_cast<float>(nearest);
+    }
+  }
+  return depth;
 }
 
 }  // namespace livemap::odometry

@@ -27,6 +27,13 @@ constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes t
 constexpr float kJaggedShare = 0.12F;
 constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
+/// No distance of a surface is exact to less than this part of what depth cameras err by.
+constexpr double kLeastSurfaceSigma = 0.02;
+/// Neighbouring pixels of a depth camera err together: all of them say as much as so many.
+constexpr double kSurfaceWorth = 120;
+/// Of the covariance; see PartSize.
+constexpr std::size_t kSurfaceParts = 12;
+
 /// Of the unknowns that are solved for; lies on the stack.
 using UpToEight = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8>;
 using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
@@ -179,11 +186,64 @@ double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
     const auto clipped = magnitude.min(k);
     sum += static_cast<double>((clipped * (2 * magnitude - clipped)).sum());
   }
+  if (surfaces_.points != nullptr) sum += RobustSurfaceCost(residuals, sigma);
   return sum / static_cast<double>(residuals.count);
 }
 
+void Aligner::MeasureSurfaces(const AlignmentState& state, Residuals& residuals) const {
+  if (surfaces_.points == nullptr) return;
+  surfaces_.points->Measure(*surfaces_.frame, *surfaces_.camera, state.new_from_reference,
+                            surfaces_every_, residuals.surfaces);
+}
+
+/// As so many edges whose residuals have this sigma; what is far from all surfaces counts as much
+/// as what is at the limit.
+double Aligner::RobustSurfaceCost(const Residuals& residuals, double sigma) const {
+  const auto k = static_cast<float>(config_.huber_k * surface_sigma_);
+  const float most = std::max(k, kOtherSurface);
+  double sum = 0;
+  std::size_t measured = 0;
+  for (std::size_t i = 0; i < residuals.surfaces.size(); ++i) {
+    const float distance = std::abs(residuals.surfaces[i]);
+    if (std::isnan(distance)) continue;
+    ++measured;
+    const float magnitude = std::min(distance, most), clipped = std::min(magnitude, k);
+    sum += static_cast<double>(clipped * (2 * magnitude - clipped));
+  }
+  if (measured == 0) return 0;
+  const double ratio = sigma / surface_sigma_;
+  return ratio * ratio * kSurfaceWorth * sum / static_cast<double>(measured);
+}
+
+/// Adds the surfaces to the normal equations, as edges whose residuals have this sigma.
+void Aligner::AddSurfaces(double sigma, double gain) {
+  const SurfacePoints::Distances& distances = current_.surfaces;
+  const std::size_t measured = distances.CountMeasured();
+  if (measured == 0) return;
+  const double ratio = sigma / surface_sigma_;
+  const double worth = ratio * ratio * kSurfaceWorth / static_cast<double>(measured);
+  const double k = config_.huber_k * surface_sigma_;
+  const std::size_t part_size = std::max<std::size_t>(1, distances.size() / kSurfaceParts);
+  Matrix6d sum = Matrix6d::Zero();
+  for (std::size_t begin = 0; begin < distances.size(); begin += part_size) {
+    Step part = Step::Zero();
+    for (std::size_t i = begin; i < std::min(distances.size(), begin + part_size); ++i) {
+      const double distance = distances[i];
+      if (!(std::abs(distance) < std::max<double>(k, kOtherSurface))) continue;
+      const Vector6d column =
+          -surfaces_.points->Jacobian(i * surfaces_every_).cast<double>() / gain;
+      const double weight = worth * k / std::max(std::abs(distance), k);
+      sum.selfadjointView<Eigen::Lower>().rankUpdate(column, weight);
+      part.head<6>() += weight * distance * column;
+    }
+    gradient_ += part;
+    scatter_ += part * part.transpose();
+  }
+  normal_.topLeftCorner<6, 6>().triangularView<Eigen::Lower>() += sum;
+}
+
 /// Equation (7): the Jacobian is the reference's and stays; only the weights change.
-void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
+void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma, double gain) {
   const auto k = static_cast<float>(config_.huber_k * sigma);
   normal_.setZero();
   scatter_.setZero();
@@ -218,6 +278,7 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma) {
     gradient_ += part;
     scatter_ += part * part.transpose();
   }
+  if (surfaces_.points != nullptr) AddSurfaces(sigma, gain);
   normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
 }
 
@@ -254,13 +315,18 @@ AlignmentState Aligner::Moved(const AlignmentState& state, const Step& step) con
 }
 
 AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
-                               const geo::CameraIntrinsics& camera, const AlignmentState& start) {
+                               const geo::CameraIntrinsics& camera, const AlignmentState& start,
+                               const SurfaceConstraint& surfaces, std::size_t every) {
   AlignmentResult result;
   result.state = start;
   result.points = points.size();
+  surfaces_ = surfaces;
+  surfaces_every_ = every;
   Whiten(points, start.new_from_reference);
   Evaluate(points, grey, camera, start, current_);
+  MeasureSurfaces(start, current_);
   double sigma = RobustSigma(current_);
+  surface_sigma_ = std::max(kLeastSurfaceSigma, current_.surfaces.Sigma());
   double cost = RobustCost(current_, sigma);
   double damping = 0;
   bool stale = true;
@@ -268,7 +334,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   Step step;
   while (result.iterations < config_.max_iterations && std::isfinite(cost)) {
     ++result.iterations;
-    if (stale) BuildNormalEquations(points, sigma);
+    if (stale) BuildNormalEquations(points, sigma, result.state.gain);
     stale = false;
     if (!seen && points.gradient_noise > 0) {
       seen.emplace(PoseInformation(), NoiseInformation(points, camera, sigma, 0));
@@ -278,6 +344,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
     if (seen && !seen->All()) step.head<6>() = seen->Told(step.head<6>());
     const AlignmentState moved = Moved(result.state, step);
     Evaluate(points, grey, camera, moved, candidate_);
+    MeasureSurfaces(moved, candidate_);
     const double new_cost = RobustCost(candidate_, sigma);
     const double pixels =
         camera.fx * (step.head<3>().norm() * points.mean_inverse_depth + step.segment<3>(3).norm());
@@ -289,12 +356,13 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
     result.state = moved;
     std::swap(current_, candidate_);
     sigma = RobustSigma(current_);
+    surface_sigma_ = std::max(kLeastSurfaceSigma, current_.surfaces.Sigma());
     cost = RobustCost(current_, sigma);
     damping = damping > kFirstDamping ? damping / 10 : 0;
     stale = true;
     if (pixels < config_.converged_px) break;
   }
-  if (stale) BuildNormalEquations(points, sigma);
+  if (stale) BuildNormalEquations(points, sigma, result.state.gain);
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
   Summarise(points, camera, sigma, result);
@@ -305,6 +373,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
 double Aligner::CostAt(const EdgePoints& points, const cv::Mat& grey,
                        const geo::CameraIntrinsics& camera, const AlignmentState& state,
                        double sigma) {
+  surfaces_ = {};
   Whiten(points, state.new_from_reference);
   Evaluate(points, grey, camera, state, candidate_);
   return RobustCost(candidate_, sigma);

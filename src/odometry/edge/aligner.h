@@ -9,6 +9,7 @@
 
 #include "geo/camera_intrinsics.h"
 #include "odometry/edge/point_selector.h"
+#include "odometry/edge/surface_points.h"
 #include "odometry/se3.h"
 
 namespace livemap::odometry {
@@ -73,9 +74,10 @@ class Aligner {
   /// Memory for so many points.
   void Reserve(std::size_t points);
 
-  /// Aligns on one level from `start` on.
+  /// Aligns on one level from `start` on. Of the surfaces every `every`-th point takes part.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
-                        const geo::CameraIntrinsics& camera, const AlignmentState& start);
+                        const geo::CameraIntrinsics& camera, const AlignmentState& start,
+                        const SurfaceConstraint& surfaces = {}, std::size_t every = 1);
 
   /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
   /// less than a tenth of the points is visible.
@@ -91,14 +93,18 @@ class Aligner {
     std::vector<float> value;
     std::vector<float> visible;  // 1 or 0.
     std::size_t count = 0;       // Visible ones.
+    SurfacePoints::Distances surfaces;
   };
 
   void Evaluate(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, Residuals& residuals) const;
   double RobustSigma(const Residuals& residuals) const;
   double RobustCost(const Residuals& residuals, double sigma) const;
+  double RobustSurfaceCost(const Residuals& residuals, double sigma) const;
+  void MeasureSurfaces(const AlignmentState& state, Residuals& residuals) const;
+  void AddSurfaces(double sigma, double gain);
   void Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference);
-  void BuildNormalEquations(const EdgePoints& points, double sigma);
+  void BuildNormalEquations(const EdgePoints& points, double sigma, double gain);
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
   float PerSlope(const EdgePoints& points) const;
@@ -113,6 +119,9 @@ class Aligner {
                  AlignmentResult& result) const;
 
   AlignmentConfig config_;
+  SurfaceConstraint surfaces_;  // Of this alignment.
+  std::size_t surfaces_every_ = 1;
+  double surface_sigma_ = 0;  // Of the distances, a part of what depth cameras err by.
   Residuals current_, candidate_;
   std::vector<float> whitening_;  // Factors of the residuals.
   Normal normal_;

@@ -331,7 +331,8 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
     const EdgePoints& points = PointsOf(keyframe, level);
     if (level == cameras_.levels - 1) state = BestStart(points, level, guesses);
     attempt.fine = aligner_.Align(points, frame_images_[level],
-                                  cameras_.camera[static_cast<std::size_t>(level)], state);
+                                  cameras_.camera[static_cast<std::size_t>(level)], state,
+                                  SurfacesOf(keyframe), SurfacesEvery(level));
     state = attempt.fine.state;
     attempt.iterations += attempt.fine.iterations;
   }
@@ -339,19 +340,28 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   return attempt;
 }
 
-std::optional<double> EdgeOdometry::SurfacesOf(const Keyframe& keyframe,
-                                               const Eigen::Isometry3d& new_from_reference) const {
-  return keyframe.surfaces.Agreement(frame_, cameras_.camera[0], new_from_reference);
+SurfaceConstraint EdgeOdometry::SurfacesOf(const Keyframe& keyframe) const {
+  if (keyframe.surfaces.size() == 0 || frame_.depth.empty()) return {};
+  return {&keyframe.surfaces, &frame_, &cameras_.camera[0]};
 }
 
 void EdgeOdometry::Judge(Attempt& attempt) const {
-  attempt.surfaces = SurfacesOf(*attempt.keyframe, attempt.fine.state.new_from_reference);
+  attempt.surfaces = attempt.keyframe->surfaces.Agreement(frame_, cameras_.camera[0],
+                                                          attempt.fine.state.new_from_reference);
   attempt.good = IsGood(*attempt.keyframe, attempt.fine) &&
                  attempt.surfaces.value_or(1) >= config_.min_surfaces;
 }
 
-double EdgeOdometry::Score(const Attempt& attempt) {
-  return ExplainedScore(attempt.fine) * attempt.surfaces.value_or(1);
+/// Whether what a search found explains clearly more than what was there, of the edges and of the
+/// surfaces; both of one keyframe.
+bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) const {
+  const SurfaceConstraint surfaces = SurfacesOf(*followed.keyframe);
+  const Eigen::Isometry3d& there = followed.fine.state.new_from_reference;
+  const Eigen::Isometry3d& here = found.fine.state.new_from_reference;
+  const double bound = SurfaceBound(std::min(surfaces.Sigma(here), surfaces.Sigma(there)));
+  return ExplainedScore(found.fine) * surfaces.Agreement(here, bound).value_or(1) >
+         ExplainedScore(followed.fine) * surfaces.Agreement(there, bound).value_or(1) +
+             kBetterScore;
 }
 
 /// Where the camera is now if its motion goes on as it was; none when that is not known.
@@ -373,8 +383,9 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   if (!IsDoubtful(followed, stamp_ns)) return followed;
   if (followed.good) guesses.Add(followed.fine.state.new_from_reference);
   const Attempt found = SearchFrom(*keyframe_, guesses);
-  const bool better = Score(found) > Score(followed) + kBetterScore;
-  Attempt attempt = found.good && (better || found.ambiguous || !followed.good) ? found : followed;
+  const bool is_taken =
+      found.good && (!followed.good || found.ambiguous || IsBetter(found, followed));
+  Attempt attempt = is_taken ? found : followed;
   TellApart(stamp_ns, attempt);
   CastDoubt(stamp_ns, attempt);
   return attempt;
@@ -468,9 +479,7 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
   reference.points_of = [this, &keyframe](int level) -> const EdgePoints& {
     return PointsOf(keyframe, level);
   };
-  reference.plausibility = [this, &keyframe](const Eigen::Isometry3d& motion) {
-    return SurfacesOf(keyframe, motion).value_or(1);
-  };
+  reference.surfaces = SurfacesOf(keyframe);
   const WideSearch::Outcome outcome = wide_search_.Search(proposals, frame_images_, reference);
   Attempt attempt;
   attempt.keyframe = &keyframe;
@@ -488,6 +497,9 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   MotionProposals proposals;
   for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);
   proposals.Add(Eigen::Isometry3d::Identity());
+  const auto by_surfaces =
+      keyframe.surfaces.NewFromReference(frame_, cameras_.camera[0], *guesses.begin());
+  if (by_surfaces) proposals.Add(*by_surfaces);
   WideSearch::ProposeAround(*guesses.begin(), proposals);
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);

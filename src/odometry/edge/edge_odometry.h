@@ -210,10 +210,9 @@ class EdgeOdometry {
   void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;
   void CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const;
   Attempt FindBack();
-  std::optional<double> SurfacesOf(const Keyframe& keyframe,
-                                   const Eigen::Isometry3d& new_from_reference) const;
+  SurfaceConstraint SurfacesOf(const Keyframe& keyframe) const;
   void Judge(Attempt& attempt) const;
-  static double Score(const Attempt& attempt);
+  bool IsBetter(const Attempt& found, const Attempt& followed) const;
   bool IsGood(const Keyframe& keyframe, const AlignmentResult& result) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
   double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,

@@ -4,11 +4,11 @@
 #include <array>
 #include <cstdint>
 
-#include "odometry/edge/depth_check.h"
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/feature_motion.h"
 #include "odometry/edge/image_pyramid.h"
 #include "odometry/edge/point_selector.h"
+#include "odometry/edge/surface_points.h"
 #include "odometry/se3.h"
 
 namespace livemap::odometry {

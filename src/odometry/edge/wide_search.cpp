@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "odometry/se3.h"
 
@@ -121,17 +122,27 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
 
 /// Aligns the candidates on a level and keeps the best that differ.
 void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
-                        const Plausibility& plausibility) {
+                        const Reference& reference) {
+  const SurfaceConstraint& surfaces = reference.surfaces;
   const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
+  double least_sigma = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
-    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state);
-    const bool believable =
-        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
-    candidate.score = believable ? ExplainedScore(candidate.result) *
-                                       plausibility(candidate.result.state.new_from_reference)
-                                 : 0;
+    candidate.result = aligner_.Align(points, grey, camera, candidate.result.state, surfaces,
+                                      SurfacesEvery(level));
+    if (level > reference.finest_level) continue;  // The motions are not exact yet.
+    const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
+    least_sigma = std::min(least_sigma, surfaces.Sigma(motion));
+  }
+  const double bound = SurfaceBound(least_sigma);
+  for (std::size_t i = 0; i < count_; ++i) {
+    Candidate& candidate = candidates_[i];
+    const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
+    candidate.score =
+        IsBelievableMove(motion, points.mean_inverse_depth)
+            ? ExplainedScore(candidate.result) * surfaces.Agreement(motion, bound).value_or(1)
+            : 0;
   }
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
@@ -161,7 +172,7 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
   double mean_inverse_depth = 0;
   for (int level = cameras_.levels - 1; level >= reference.finest_level; --level) {
     const EdgePoints& points = reference.points_of(level);
-    Refine(points, images[level], level, reference.plausibility);
+    Refine(points, images[level], level, reference);
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
     mean_inverse_depth = points.mean_inverse_depth;
   }

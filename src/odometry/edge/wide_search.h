@@ -53,13 +53,11 @@ class WideSearch {
     AlignmentResult rival;  ///< That motion.
     int iterations = 0;
   };
-  /// What else is known for or against a motion: a factor of its score, 0 to 1.
-  using Plausibility = std::function<double(const Eigen::Isometry3d& new_from_reference)>;
   /// What is aligned with the images.
   struct Reference {
     /// The points to align on a level; asked for once per level.
     std::function<const EdgePoints&(int level)> points_of;
-    Plausibility plausibility;
+    SurfaceConstraint surfaces;
     int finest_level = 0;  ///< The last one that is aligned.
   };
 
@@ -96,8 +94,7 @@ class WideSearch {
     double score = 0;
   };
 
-  void Refine(const EdgePoints& points, const cv::Mat& grey, int level,
-              const Plausibility& plausibility);
+  void Refine(const EdgePoints& points, const cv::Mat& grey, int level, const Reference& reference);
 
   Aligner aligner_;
   LevelCameras cameras_;
@@ -105,6 +102,9 @@ class WideSearch {
   std::array<Candidate, MotionProposals::kMost> candidates_;
   std::size_t count_ = 0;
 };
+
+/// Of the surfaces' points every so many take part in an alignment on a level.
+constexpr std::size_t SurfacesEvery(int level) { return level == 0 ? 2 : 4; }
 
 /// Share of the points that an alignment explains; those out of view count in part, so that looking
 /// away explains nothing.

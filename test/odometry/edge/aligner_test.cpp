@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -314,6 +315,30 @@ TEST(Aligner, StripesLeaveAMovementUnseenAndTheCovarianceSaysSo) {
     // Up and down along the stripes by a hand's breadth at the least.
     EXPECT_GT(result.covariance(1, 1), 0.1 * 0.1);
   }
+}
+
+TEST(Aligner, SurfacesTellTheMovementThatStripesLeaveUnseen) {
+  RgbdFrame stripes;
+  stripes.grey.create(240, 320, CV_8UC1);
+  const std::array<int, 3> greys = {60, 190, 110};
+  for (int x = 0; x < 320; ++x) {
+    stripes.grey.col(x).setTo(greys[static_cast<std::size_t>(x / 16 % 3)]);
+  }
+  cv::GaussianBlur(stripes.grey, stripes.grey, {3, 3}, 0);
+  stripes.depth = DepthOfCorner(Eigen::Isometry3d::Identity());
+  SurfacePoints corner;
+  corner.Take(stripes.depth, kWallCamera);
+  RgbdFrame lower = stripes;
+  lower.depth = DepthOfCorner(Pose(0, 0.03, 0, 0, 0, 0));
+  const EdgePoints points = PointsOf(stripes);
+  Aligner aligner({});
+  const AlignmentResult by_edges = aligner.Align(points, lower.grey, kWallCamera, {});
+  EXPECT_NEAR(by_edges.state.new_from_reference.translation().y(), 0, 1e-3);
+  const AlignmentResult result =
+      aligner.Align(points, lower.grey, kWallCamera, {}, {&corner, &lower, &kWallCamera});
+  EXPECT_NEAR(result.state.new_from_reference.translation().y(), -0.03, 1e-3);
+  EXPECT_LT(result.covariance(1, 1), 0.005 * 0.005);
+  EXPECT_LT(result.cost, by_edges.cost + 1);
 }
 
 }  // namespace
