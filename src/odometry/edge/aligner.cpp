@@ -27,11 +27,12 @@ constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes t
 constexpr float kJaggedShare = 0.12F;
 constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
-/// No distance of a surface is exact to less than this part of what depth cameras err by.
+/// Least standard deviation of the distances to surfaces: exact depth does not outvote all edges.
 constexpr double kLeastSurfaceSigma = 0.02;
-/// Neighbouring pixels of a depth camera err together: all of them say as much as so many.
+/// All surfaces together weigh as much as so many edges: neighbouring pixels of a depth camera err
+/// together.
 constexpr double kSurfaceWorth = 120;
-/// Of the covariance; see PartSize.
+/// So many parts of the covariance are of surfaces; see PartSize.
 constexpr std::size_t kSurfaceParts = 12;
 
 /// Of the unknowns that are solved for; lies on the stack.
@@ -186,60 +187,71 @@ double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
     const auto clipped = magnitude.min(k);
     sum += static_cast<double>((clipped * (2 * magnitude - clipped)).sum());
   }
-  if (surfaces_.points != nullptr) sum += RobustSurfaceCost(residuals, sigma);
-  return sum / static_cast<double>(residuals.count);
+  return (sum + RobustSurfaceCost(residuals, sigma)) / static_cast<double>(residuals.count);
 }
 
 void Aligner::MeasureSurfaces(const AlignmentState& state, Residuals& residuals) const {
+  residuals.distances.Clear();
   if (surfaces_.points == nullptr) return;
-  surfaces_.points->Measure(*surfaces_.frame, *surfaces_.camera, state.new_from_reference,
-                            surfaces_every_, residuals.surfaces);
+  surfaces_.points->Measure(surfaces_.depth, state.new_from_reference, surfaces_every_,
+                            residuals.distances);
 }
 
-/// As so many edges whose residuals have this sigma; what is far from all surfaces counts as much
-/// as what is at the limit.
+/// Stays as it was where nothing is measured any more.
+void Aligner::UpdateSurfaceSigma() {
+  if (current_.distances.measured() == 0) return;
+  surface_sigma_ = std::max(kLeastSurfaceSigma, current_.distances.Sigma());
+}
+
+/// The surfaces' part of the sum in (3), in squared grey levels. Another surface counts as much as
+/// the limit to it, and so does a place where nothing is measured any more.
 double Aligner::RobustSurfaceCost(const Residuals& residuals, double sigma) const {
+  if (surfaces_.points == nullptr) return 0;
   const auto k = static_cast<float>(config_.huber_k * surface_sigma_);
   const float most = std::max(k, kOtherSurface);
+  const auto rho = [k](float magnitude) {
+    const float clipped = std::min(magnitude, k);
+    return static_cast<double>(clipped * (2 * magnitude - clipped));
+  };
   double sum = 0;
-  std::size_t measured = 0;
-  for (std::size_t i = 0; i < residuals.surfaces.size(); ++i) {
-    const float distance = std::abs(residuals.surfaces[i]);
-    if (std::isnan(distance)) continue;
-    ++measured;
-    const float magnitude = std::min(distance, most), clipped = std::min(magnitude, k);
-    sum += static_cast<double>(clipped * (2 * magnitude - clipped));
+  for (std::size_t i = 0; i < residuals.distances.size(); ++i) {
+    const float magnitude = std::abs(residuals.distances[i]);
+    if (!std::isnan(magnitude)) sum += rho(std::min(magnitude, most));
   }
-  if (measured == 0) return 0;
+  const std::size_t measured = residuals.distances.measured();
+  const double mean = measured == 0 ? rho(most) : sum / static_cast<double>(measured);
   const double ratio = sigma / surface_sigma_;
-  return ratio * ratio * kSurfaceWorth * sum / static_cast<double>(measured);
+  return ratio * ratio * kSurfaceWorth * mean;
 }
 
 /// Adds the surfaces to the normal equations, as edges whose residuals have this sigma.
 void Aligner::AddSurfaces(double sigma, double gain) {
-  const SurfacePoints::Distances& distances = current_.surfaces;
-  const std::size_t measured = distances.CountMeasured();
-  if (measured == 0) return;
+  const SurfaceDistances& distances = current_.distances;
+  surface_parts_ = 0;
+  if (distances.measured() == 0) return;
   const double ratio = sigma / surface_sigma_;
-  const double worth = ratio * ratio * kSurfaceWorth / static_cast<double>(measured);
-  const double k = config_.huber_k * surface_sigma_;
-  const std::size_t part_size = std::max<std::size_t>(1, distances.size() / kSurfaceParts);
-  Matrix6d sum = Matrix6d::Zero();
-  for (std::size_t begin = 0; begin < distances.size(); begin += part_size) {
-    Step part = Step::Zero();
+  const double worth = ratio * ratio * kSurfaceWorth / static_cast<double>(distances.measured());
+  const auto k = static_cast<float>(config_.huber_k * surface_sigma_);
+  const float most = std::max(k, kOtherSurface);
+  const std::size_t part_size = (distances.size() + kSurfaceParts - 1) / kSurfaceParts;
+  Eigen::Matrix<float, 6, 6> sum = Eigen::Matrix<float, 6, 6>::Zero();
+  for (std::size_t begin = 0; begin < distances.size(); begin += part_size, ++surface_parts_) {
+    SurfacePoints::Row part = SurfacePoints::Row::Zero();
     for (std::size_t i = begin; i < std::min(distances.size(), begin + part_size); ++i) {
-      const double distance = distances[i];
-      if (!(std::abs(distance) < std::max<double>(k, kOtherSurface))) continue;
-      const Vector6d column =
-          -surfaces_.points->Jacobian(i * surfaces_every_).cast<double>() / gain;
-      const double weight = worth * k / std::max(std::abs(distance), k);
-      sum.selfadjointView<Eigen::Lower>().rankUpdate(column, weight);
-      part.head<6>() += weight * distance * column;
+      const float distance = distances[i];
+      if (!(std::abs(distance) < most)) continue;
+      const SurfacePoints::Row& row = surfaces_.points->Jacobian(i * surfaces_every_);
+      const SurfacePoints::Row weighted = k / std::max(std::abs(distance), k) * row;
+      sum.noalias() += weighted * row.transpose();
+      part += distance * weighted;
     }
-    gradient_ += part;
-    scatter_ += part * part.transpose();
+    // The step is one of the points, times the gain: minus that of the motion.
+    Step step = Step::Zero();
+    step.head<6>() = -worth / gain * part.cast<double>();
+    gradient_ += step;
+    scatter_ += step * step.transpose();
   }
-  normal_.topLeftCorner<6, 6>().triangularView<Eigen::Lower>() += sum;
+  normal_.topLeftCorner<6, 6>() += worth / (gain * gain) * sum.cast<double>();
 }
 
 /// Equation (7): the Jacobian is the reference's and stays; only the weights change.
@@ -278,7 +290,7 @@ void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma, doubl
     gradient_ += part;
     scatter_ += part * part.transpose();
   }
-  if (surfaces_.points != nullptr) AddSurfaces(sigma, gain);
+  AddSurfaces(sigma, gain);
   normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
 }
 
@@ -325,8 +337,9 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   Whiten(points, start.new_from_reference);
   Evaluate(points, grey, camera, start, current_);
   MeasureSurfaces(start, current_);
+  if (current_.distances.measured() == 0) surfaces_ = {};
   double sigma = RobustSigma(current_);
-  surface_sigma_ = std::max(kLeastSurfaceSigma, current_.surfaces.Sigma());
+  UpdateSurfaceSigma();
   double cost = RobustCost(current_, sigma);
   double damping = 0;
   bool stale = true;
@@ -335,8 +348,10 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   while (result.iterations < config_.max_iterations && std::isfinite(cost)) {
     ++result.iterations;
     if (stale) BuildNormalEquations(points, sigma, result.state.gain);
+    // Surfaces tell more when they are near.
+    const bool is_asked = !seen || (stale && !seen->All());
     stale = false;
-    if (!seen && points.gradient_noise > 0) {
+    if (is_asked && points.gradient_noise > 0) {
       seen.emplace(PoseInformation(), NoiseInformation(points, camera, sigma, 0));
     }
     if (!Solve(damping, step)) break;
@@ -356,7 +371,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
     result.state = moved;
     std::swap(current_, candidate_);
     sigma = RobustSigma(current_);
-    surface_sigma_ = std::max(kLeastSurfaceSigma, current_.surfaces.Sigma());
+    UpdateSurfaceSigma();
     cost = RobustCost(current_, sigma);
     damping = damping > kFirstDamping ? damping / 10 : 0;
     stale = true;
@@ -436,6 +451,7 @@ Matrix6d Aligner::PoseInformation() const {
 void Aligner::Summarise(const EdgePoints& points, const geo::CameraIntrinsics& camera, double sigma,
                         AlignmentResult& result) const {
   result.sigma = sigma;
+  result.surface_sigma = current_.distances.Sigma();
   result.visible = current_.count;
   const auto k = static_cast<float>(config_.huber_k * sigma);
   for (std::size_t i = 0; i < current_.value.size(); ++i) {
@@ -451,7 +467,9 @@ void Aligner::Summarise(const EdgePoints& points, const geo::CameraIntrinsics& c
   // Parts that the unknowns were fitted to contradict each other less than others would.
   const std::size_t size = current_.value.size();
   const double parts =
-      std::max(2.0, static_cast<double>(size) / static_cast<double>(6 * PartSize(size)));
+      std::max(2.0, (static_cast<double>(size) / static_cast<double>(PartSize(size)) +
+                     static_cast<double>(surface_parts_)) /
+                        6);
   const UpToEight whole = factors.solve(half.transpose());
   result.covariance =
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);

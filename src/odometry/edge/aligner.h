@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -40,12 +41,14 @@ struct AlignmentResult {
   /// residuals of variance 1 that are independent of each other.
   Matrix6d information = Matrix6d::Zero();
   /// Covariance of delta by how much parts of the image contradict each other: edge pixels that err
-  /// together, by a depth or by aliasing, count once, and exact ones err little. Movements that no
-  /// edge shows, or only the noise of the gradients, have a variance of 100 square metres or
-  /// radians.
+  /// together, by a depth or by aliasing, count once, and exact ones err little. Movements that
+  /// neither edge nor surface shows, or only the noise of the gradients, have a variance of 100
+  /// square metres or radians.
   Matrix6d covariance = Matrix6d::Zero();
-  double sigma = 0;         ///< Robust standard deviation of the residuals, grey levels.
-  double cost = 0;          ///< Mean robust cost, squared grey levels.
+  double sigma = 0;  ///< Robust standard deviation of the residuals, grey levels.
+  /// That of the distances to the surfaces, see SurfaceDistances; infinite without surfaces.
+  double surface_sigma = std::numeric_limits<double>::infinity();
+  double cost = 0;          ///< Mean robust cost with that of the surfaces, squared grey levels.
   std::size_t points = 0;   ///< Of the reference.
   std::size_t visible = 0;  ///< Of them, those that fall into the new image.
   std::size_t inliers = 0;  ///< Of them, those with full weight.
@@ -63,8 +66,9 @@ struct AlignmentResult {
   }
 };
 
-/// Minimises the photometric error of edge points by inverse compositional Gauss-Newton with Huber
-/// weights (thesis, section 5.2.4; Baker and Matthews 2004); a step that does not lower the robust
+/// Minimises the photometric error of edge points, and the distances of surfaces where there are
+/// some, by inverse compositional Gauss-Newton with Huber weights (thesis, section 5.2.4; Baker and
+/// Matthews 2004); a step that does not lower the robust
 /// cost is rolled back and damped (Levenberg). docs/explanation/odometry.md derives it. Keeps its
 /// buffers from call to call; not thread-safe.
 class Aligner {
@@ -74,12 +78,13 @@ class Aligner {
   /// Memory for so many points.
   void Reserve(std::size_t points);
 
-  /// Aligns on one level from `start` on. Of the surfaces every `every`-th point takes part.
+  /// Aligns on one level from `start` on. Of the surfaces every `every`-th point takes part, 1:
+  /// all.
   AlignmentResult Align(const EdgePoints& points, const cv::Mat& grey,
                         const geo::CameraIntrinsics& camera, const AlignmentState& start,
                         const SurfaceConstraint& surfaces = {}, std::size_t every = 1);
 
-  /// Mean robust cost at `state` for residuals of this sigma, without optimising; infinite when
+  /// Mean robust cost of the edges at `state` for residuals of this sigma; infinite when
   /// less than a tenth of the points is visible.
   double CostAt(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, double sigma);
@@ -93,7 +98,7 @@ class Aligner {
     std::vector<float> value;
     std::vector<float> visible;  // 1 or 0.
     std::size_t count = 0;       // Visible ones.
-    SurfacePoints::Distances surfaces;
+    SurfaceDistances distances;  // To the surfaces.
   };
 
   void Evaluate(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
@@ -102,6 +107,7 @@ class Aligner {
   double RobustCost(const Residuals& residuals, double sigma) const;
   double RobustSurfaceCost(const Residuals& residuals, double sigma) const;
   void MeasureSurfaces(const AlignmentState& state, Residuals& residuals) const;
+  void UpdateSurfaceSigma();
   void AddSurfaces(double sigma, double gain);
   void Whiten(const EdgePoints& points, const Eigen::Isometry3d& new_from_reference);
   void BuildNormalEquations(const EdgePoints& points, double sigma, double gain);
@@ -121,7 +127,8 @@ class Aligner {
   AlignmentConfig config_;
   SurfaceConstraint surfaces_;  // Of this alignment.
   std::size_t surfaces_every_ = 1;
-  double surface_sigma_ = 0;  // Of the distances, a part of what depth cameras err by.
+  double surface_sigma_ = 1;       // Of the distances.
+  std::size_t surface_parts_ = 0;  // Of scatter_.
   Residuals current_, candidate_;
   std::vector<float> whitening_;  // Factors of the residuals.
   Normal normal_;

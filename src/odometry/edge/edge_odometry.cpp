@@ -52,6 +52,16 @@ EdgeExtractor::Config FaintEdges(EdgeExtractor::Config config) {
   return config;
 }
 
+/// The covariance of what a matrix makes of a vector with this one. Its variances are sums of
+/// squares: no rounding makes them negative.
+Matrix6d Transformed(const Matrix6d& by, const Matrix6d& covariance) {
+  const Eigen::LDLT<Matrix6d> factors(covariance);
+  const Matrix6d root = factors.transpositionsP().transpose() * Matrix6d(factors.matrixL()) *
+                        factors.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const Matrix6d moved = by * root;
+  return moved * moved.transpose();
+}
+
 AlignmentConfig OdometryOfRotationOnly(AlignmentConfig config) {
   config.rotation_only = true;
   return config;
@@ -330,9 +340,9 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   for (int level = cameras_.levels - 1; level >= keyframe.finest_level; --level) {
     const EdgePoints& points = PointsOf(keyframe, level);
     if (level == cameras_.levels - 1) state = BestStart(points, level, guesses);
-    attempt.fine = aligner_.Align(points, frame_images_[level],
-                                  cameras_.camera[static_cast<std::size_t>(level)], state,
-                                  SurfacesOf(keyframe), SurfacesEvery(level));
+    attempt.fine = aligner_.Align(
+        points, frame_images_[level], cameras_.camera[static_cast<std::size_t>(level)], state,
+        SurfacesOf(keyframe), SurfacesEvery(level == keyframe.finest_level));
     state = attempt.fine.state;
     attempt.iterations += attempt.fine.iterations;
   }
@@ -340,14 +350,18 @@ EdgeOdometry::Attempt EdgeOdometry::TrackFrom(Keyframe& keyframe, const Guesses&
   return attempt;
 }
 
+MeasuredDepth EdgeOdometry::Depth() const {
+  return {&frame_, &cameras_.camera[0], config_.depth_range};
+}
+
 SurfaceConstraint EdgeOdometry::SurfacesOf(const Keyframe& keyframe) const {
   if (keyframe.surfaces.size() == 0 || frame_.depth.empty()) return {};
-  return {&keyframe.surfaces, &frame_, &cameras_.camera[0]};
+  return {&keyframe.surfaces, Depth()};
 }
 
 void EdgeOdometry::Judge(Attempt& attempt) const {
-  attempt.surfaces = attempt.keyframe->surfaces.Agreement(frame_, cameras_.camera[0],
-                                                          attempt.fine.state.new_from_reference);
+  attempt.surfaces =
+      SurfacesOf(*attempt.keyframe).Agreement(attempt.fine.state.new_from_reference, 1);
   attempt.good = IsGood(*attempt.keyframe, attempt.fine) &&
                  attempt.surfaces.value_or(1) >= config_.min_surfaces;
 }
@@ -356,12 +370,13 @@ void EdgeOdometry::Judge(Attempt& attempt) const {
 /// surfaces; both of one keyframe.
 bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) const {
   const SurfaceConstraint surfaces = SurfacesOf(*followed.keyframe);
-  const Eigen::Isometry3d& there = followed.fine.state.new_from_reference;
-  const Eigen::Isometry3d& here = found.fine.state.new_from_reference;
-  const double bound = SurfaceBound(std::min(surfaces.Sigma(here), surfaces.Sigma(there)));
-  return ExplainedScore(found.fine) * surfaces.Agreement(here, bound).value_or(1) >
-         ExplainedScore(followed.fine) * surfaces.Agreement(there, bound).value_or(1) +
-             kBetterScore;
+  const double bound =
+      SurfaceBound(std::min(found.fine.surface_sigma, followed.fine.surface_sigma));
+  const auto here = surfaces.Agreement(found.fine.state.new_from_reference, bound);
+  const auto there = surfaces.Agreement(followed.fine.state.new_from_reference, bound);
+  const bool both = here && there;
+  return ExplainedScore(found.fine) * (both ? *here : 1) >
+         ExplainedScore(followed.fine) * (both ? *there : 1) + kBetterScore;
 }
 
 /// Where the camera is now if its motion goes on as it was; none when that is not known.
@@ -497,8 +512,7 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   MotionProposals proposals;
   for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);
   proposals.Add(Eigen::Isometry3d::Identity());
-  const auto by_surfaces =
-      keyframe.surfaces.NewFromReference(frame_, cameras_.camera[0], *guesses.begin());
+  const auto by_surfaces = keyframe.surfaces.NewFromReference(Depth(), *guesses.begin());
   if (by_surfaces) proposals.Add(*by_surfaces);
   WideSearch::ProposeAround(*guesses.begin(), proposals);
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
@@ -625,7 +639,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
     relative += to_rival * to_rival.transpose();
   }
   const Matrix6d to_new = Se3Adjoint(fine.state.new_from_reference);
-  result.covariance = to_new * (keyframe_->covariance + relative) * to_new.transpose();
+  result.covariance = Transformed(to_new, keyframe_->covariance + relative);
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   ambiguous_frames_ = attempt.ambiguous ? ambiguous_frames_ + 1 : 0;
@@ -642,7 +656,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   if (last_.state == VoState::kTracking && settled_) {
     result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
     // Both ends err by the alignment with the keyframe.
-    result.twist_covariance = 2 / (step_s * step_s) * (to_new * relative * to_new.transpose());
+    result.twist_covariance = 2 / (step_s * step_s) * Transformed(to_new, relative);
   }
   result.keyframe_stamp_ns = keyframe_->stamp_ns;
   result.points = fine.points;
@@ -663,8 +677,7 @@ Matrix6d EdgeOdometry::WithinReach(const Matrix6d& covariance, double time_s) co
   if (sum.info() != Eigen::Success) return covariance;
   // Joseph's form: no rounding makes a variance negative, however small the reach.
   const Matrix6d gain = sum.solve(covariance).transpose();
-  const Matrix6d rest = Matrix6d::Identity() - gain;
-  return rest * covariance * rest.transpose() + gain * reach * gain.transpose();
+  return Transformed(Matrix6d::Identity() - gain, covariance) + Transformed(gain, reach);
 }
 
 VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {

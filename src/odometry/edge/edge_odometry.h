@@ -210,6 +210,7 @@ class EdgeOdometry {
   void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;
   void CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const;
   Attempt FindBack();
+  MeasuredDepth Depth() const;
   SurfaceConstraint SurfacesOf(const Keyframe& keyframe) const;
   void Judge(Attempt& attempt) const;
   bool IsBetter(const Attempt& found, const Attempt& followed) const;

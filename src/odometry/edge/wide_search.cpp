@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "odometry/se3.h"
 
@@ -126,24 +127,21 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
   const SurfaceConstraint& surfaces = reference.surfaces;
   const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
+  const bool is_finest = level == reference.finest_level;
   double least_sigma = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
     candidate.result = aligner_.Align(points, grey, camera, candidate.result.state, surfaces,
-                                      SurfacesEvery(level));
-    if (level > reference.finest_level) continue;  // The motions are not exact yet.
-    const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
-    least_sigma = std::min(least_sigma, surfaces.Sigma(motion));
+                                      SurfacesEvery(is_finest));
+    const bool is_believable =
+        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
+    candidate.score = is_believable ? ExplainedScore(candidate.result) : 0;
+    // On coarser levels the motions are not exact enough for a narrow bound.
+    if (is_believable && is_finest) {
+      least_sigma = std::min(least_sigma, candidate.result.surface_sigma);
+    }
   }
-  const double bound = SurfaceBound(least_sigma);
-  for (std::size_t i = 0; i < count_; ++i) {
-    Candidate& candidate = candidates_[i];
-    const Eigen::Isometry3d& motion = candidate.result.state.new_from_reference;
-    candidate.score =
-        IsBelievableMove(motion, points.mean_inverse_depth)
-            ? ExplainedScore(candidate.result) * surfaces.Agreement(motion, bound).value_or(1)
-            : 0;
-  }
+  AskSurfaces(surfaces, SurfaceBound(least_sigma));
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::size_t kept = 0;
@@ -158,6 +156,19 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
     if (!known) candidates_[kept++] = candidates_[i];
   }
   count_ = kept;
+}
+
+/// Multiplies the scores by the share of the surfaces that agree. Who looks where nothing is
+/// measured has no more of it than the others.
+void WideSearch::AskSurfaces(const SurfaceConstraint& surfaces, double bound) {
+  std::array<std::optional<double>, MotionProposals::kMost> shares;
+  double least = 1;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (candidates_[i].score == 0) continue;
+    shares[i] = surfaces.Agreement(candidates_[i].result.state.new_from_reference, bound);
+    least = std::min(least, shares[i].value_or(1));
+  }
+  for (std::size_t i = 0; i < count_; ++i) candidates_[i].score *= shares[i].value_or(least);
 }
 
 WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,

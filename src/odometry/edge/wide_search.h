@@ -10,6 +10,7 @@
 #include "odometry/edge/image_pyramid.h"
 #include "odometry/edge/keyframe.h"
 #include "odometry/edge/shift_search.h"
+#include "odometry/edge/surface_points.h"
 
 namespace livemap::odometry {
 
@@ -41,8 +42,9 @@ struct LevelCameras {
 LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest);
 
 /// Looks for a motion of which nothing is known: many alignments on the coarsest level, of which
-/// the best go on to the finer ones. The winner is who explains the largest share of the edges, so
-/// that a false minimum loses to the true one even where both are minima. Keeps its buffers; not
+/// the best go on to the finer ones. The winner is who explains the largest share of the edges,
+/// times the share of the surfaces that agree, so that a false minimum loses to the true one even
+/// where both are minima. Keeps its buffers; not
 /// thread-safe.
 class WideSearch {
  public:
@@ -87,6 +89,7 @@ class WideSearch {
 
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
                  const Reference& reference);
+  void AskSurfaces(const SurfaceConstraint& surfaces, double bound);
 
  private:
   struct Candidate {
@@ -102,9 +105,6 @@ class WideSearch {
   std::array<Candidate, MotionProposals::kMost> candidates_;
   std::size_t count_ = 0;
 };
-
-/// Of the surfaces' points every so many take part in an alignment on a level.
-constexpr std::size_t SurfacesEvery(int level) { return level == 0 ? 2 : 4; }
 
 /// Share of the points that an alignment explains; those out of view count in part, so that looking
 /// away explains nothing.

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <utility>
@@ -317,28 +318,55 @@ TEST(Aligner, StripesLeaveAMovementUnseenAndTheCovarianceSaysSo) {
   }
 }
 
-TEST(Aligner, SurfacesTellTheMovementThatStripesLeaveUnseen) {
+/// Stripes up and down in the image, wherever they are in space.
+RgbdFrame StripesOnCorner(const Eigen::Isometry3d& world_from_camera) {
+  const std::array<int, 3> greys = {60, 190, 110};
   RgbdFrame stripes;
   stripes.grey.create(240, 320, CV_8UC1);
-  const std::array<int, 3> greys = {60, 190, 110};
   for (int x = 0; x < 320; ++x) {
     stripes.grey.col(x).setTo(greys[static_cast<std::size_t>(x / 16 % 3)]);
   }
   cv::GaussianBlur(stripes.grey, stripes.grey, {3, 3}, 0);
-  stripes.depth = DepthOfCorner(Eigen::Isometry3d::Identity());
+  stripes.depth = DepthOfCorner(world_from_camera);
+  return stripes;
+}
+
+TEST(Aligner, SurfacesTellTheMovementThatStripesLeaveUnseen) {
+  const RgbdFrame stripes = StripesOnCorner(Eigen::Isometry3d::Identity());
   SurfacePoints corner;
   corner.Take(stripes.depth, kWallCamera);
-  RgbdFrame lower = stripes;
-  lower.depth = DepthOfCorner(Pose(0, 0.03, 0, 0, 0, 0));
-  const EdgePoints points = PointsOf(stripes);
-  Aligner aligner({});
-  const AlignmentResult by_edges = aligner.Align(points, lower.grey, kWallCamera, {});
-  EXPECT_NEAR(by_edges.state.new_from_reference.translation().y(), 0, 1e-3);
-  const AlignmentResult result =
-      aligner.Align(points, lower.grey, kWallCamera, {}, {&corner, &lower, &kWallCamera});
-  EXPECT_NEAR(result.state.new_from_reference.translation().y(), -0.03, 1e-3);
-  EXPECT_LT(result.covariance(1, 1), 0.005 * 0.005);
-  EXPECT_LT(result.cost, by_edges.cost + 1);
+  for (const double gain : {1.0, 0.6}) {
+    RgbdFrame lower = StripesOnCorner(Pose(0, 0.03, 0, 0, 0, 0));
+    lower.grey *= gain;
+    EdgePoints points = PointsOf(stripes);
+    points.gradient_noise = 0.1;
+    Aligner aligner({});
+    const AlignmentResult by_edges = aligner.Align(points, lower.grey, kWallCamera, {});
+    EXPECT_NEAR(by_edges.state.new_from_reference.translation().y(), 0, 1e-3);
+    EXPECT_EQ(by_edges.surface_sigma, std::numeric_limits<double>::infinity());
+    for (const std::size_t every : {1, 4}) {
+      const AlignmentResult result = aligner.Align(points, lower.grey, kWallCamera, {},
+                                                   {&corner, {&lower, &kWallCamera, {}}}, every);
+      const Eigen::Vector3d moved = result.state.new_from_reference.translation();
+      EXPECT_LT((moved - Eigen::Vector3d(0, -0.03, 0)).norm(), 2e-3) << moved.transpose();
+      EXPECT_LT(result.covariance(1, 1), 0.005 * 0.005);
+      EXPECT_LT(result.surface_sigma, 0.02);
+    }
+  }
+}
+
+TEST(Aligner, AFewMeasurementsOfDepthDoNotMoveThePose) {
+  const RgbdFrame frame = SyntheticWall(kWallCamera).See(1, Eigen::Isometry3d::Identity());
+  SurfacePoints wall;
+  wall.Take(frame.depth, kWallCamera);
+  RgbdFrame sparse = frame;
+  sparse.depth = cv::Mat::zeros(frame.depth.size(), CV_32FC1);
+  cv::Mat few = sparse.depth(cv::Rect(150, 110, 12, 12));
+  cv::Mat(frame.depth(cv::Rect(150, 110, 12, 12)) * 0.98).copyTo(few);
+  const AlignmentResult result = Aligner({}).Align(PointsOf(frame), frame.grey, kWallCamera, {},
+                                                   {&wall, {&sparse, &kWallCamera, {}}});
+  EXPECT_LT(result.state.new_from_reference.translation().norm(), 1e-4);
+  EXPECT_EQ(result.surface_sigma, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -406,6 +407,34 @@ TEST(EdgeOdometry, OfAMovementAlongStripesItSaysThatItDoesNotKnowIt) {
       EXPECT_GT(variance, 0.5 * 0.5) << "lean " << lean << ", frame " << i;
     }
     EXPECT_GE(with_velocity, 10);
+  }
+}
+
+TEST(EdgeOdometry, ACornerTellsTheMovementAlongItsStripes) {
+  // The walls' stripes go up and down, the floor is bare, and the camera sinks.
+  EdgeOdometry odometry({}, kWallCamera);
+  const std::array<int, 3> greys = {60, 190, 110};
+  for (int i = 0; i < 10; ++i) {
+    const Eigen::Isometry3d pose = Pose(0, 0.01 * i, 0, 0, 0, 0);
+    RgbdFrame frame;
+    frame.stamp_ns = Stamp(i);
+    frame.depth = DepthOfCorner(pose);
+    frame.grey.create(frame.depth.size(), CV_8UC1);
+    for (int v = 0; v < frame.grey.rows; ++v) {
+      for (int u = 0; u < frame.grey.cols; ++u) {
+        const double depth = frame.depth.at<float>(v, u);
+        const double x = (u - kWallCamera.cx) / kWallCamera.fx * depth;
+        const double y = 0.01 * i + (v - kWallCamera.cy) / kWallCamera.fy * depth;
+        const auto stripe = static_cast<std::size_t>(std::floor((x - depth + 20) / 0.2));
+        frame.grey.at<std::uint8_t>(v, u) =
+            static_cast<std::uint8_t>(y > 0.79 ? 60 : greys[stripe % 3]);
+      }
+    }
+    cv::GaussianBlur(frame.grey, frame.grey, {5, 5}, 0);
+    const VoResult result = odometry.Track(frame);
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    EXPECT_NEAR(result.world_from_camera.translation().y(), 0.01 * i, 4e-3) << i;
+    EXPECT_LT(result.covariance(1, 1), 0.01 * 0.01) << i;
   }
 }
 
