@@ -32,15 +32,20 @@ constexpr int kCellsAcross = 8, kCellsDown = 6;
 constexpr double kFaintEdgeGradient = 2;
 constexpr float kFaintPointGradient = 0.8F;
 
+/// The cell at a part of the image's width or height, also where rounding puts that outside.
+int CellAt(double part, int cells) {
+  const double cell = part * cells;
+  return cell > 0 ? static_cast<int>(std::min(cell, cells - 1.0)) : 0;  // NaN is 0, too.
+}
+
 /// Share of the cells of the image that have points.
 double CoveredShare(const EdgePoints& points, const geo::CameraIntrinsics& camera) {
   std::array<bool, kCellsAcross * kCellsDown> covered{};
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double u = camera.fx * static_cast<double>(points.x[i] / points.z[i]) + camera.cx;
     const double v = camera.fy * static_cast<double>(points.y[i] / points.z[i]) + camera.cy;
-    const int column =
-        std::clamp(static_cast<int>(u * kCellsAcross / camera.width), 0, kCellsAcross - 1);
-    const int row = std::clamp(static_cast<int>(v * kCellsDown / camera.height), 0, kCellsDown - 1);
+    const int column = CellAt(u / camera.width, kCellsAcross);
+    const int row = CellAt(v / camera.height, kCellsDown);
     covered[static_cast<std::size_t>(row * kCellsAcross + column)] = true;
   }
   return static_cast<double>(std::count(covered.begin(), covered.end(), true)) /

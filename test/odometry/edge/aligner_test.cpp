@@ -344,7 +344,7 @@ TEST(Aligner, SurfacesTellTheMovementThatStripesLeaveUnseen) {
     const AlignmentResult by_edges = aligner.Align(points, lower.grey, kWallCamera, {});
     EXPECT_NEAR(by_edges.state.new_from_reference.translation().y(), 0, 1e-3);
     EXPECT_EQ(by_edges.surface_sigma, std::numeric_limits<double>::infinity());
-    for (const std::size_t every : {1, 4}) {
+    for (const std::size_t every : {std::size_t{1}, std::size_t{4}}) {
       const AlignmentResult result = aligner.Align(points, lower.grey, kWallCamera, {},
                                                    {&corner, {&lower, &kWallCamera, {}}}, every);
       const Eigen::Vector3d moved = result.state.new_from_reference.translation();
