@@ -28,7 +28,7 @@ constexpr float kJaggedShare = 0.12F;
 constexpr double kMinGain = 0.25;  // A black image must not explain everything.
 
 /// Least standard deviation of the distances to surfaces: exact depth does not outvote all edges.
-constexpr double kLeastSurfaceSigma = 0.02;
+constexpr double kLeastSurfaceSigma = 0.005;
 /// All surfaces together weigh as much as so many edges: neighbouring pixels of a depth camera err
 /// together.
 constexpr double kSurfaceWorth = 120;
