@@ -19,8 +19,7 @@ constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
-constexpr float kNoiseGrey = 8;        // Residuals up to this are explained on any edge;
-constexpr float kExplainedPx = 0.75F;  // others when so much of a pixel makes them.
+constexpr float kExplainedPx = 0.75F;  // What is no noise is explained by so much of a pixel.
 /// Of a gradient, what its direction errs by, in what is stated: a pixel that sees one ray makes
 /// steps of slanted edges, which slide along them. Steps trust it all the same, weak edges are
 /// often right.
@@ -51,19 +50,15 @@ std::size_t PartSize(std::size_t points) {
   return std::clamp(points / kParts, kLeast, kChunk);
 }
 
-/// What the covariance says of movements that no edge shows, square metres and radians: all but
-/// nothing.
-constexpr double kUnseen = 100;
-
 /// With the movements that no edge shows. Edges of one direction leave one unseen; its variance is
 /// then a quotient of rounding errors, of either sign, or zero.
 Matrix6d WithUnseen(const Matrix6d& covariance, const Matrix6d& information) {
   constexpr double kSeenShare = 1e-9;
   const Eigen::SelfAdjointEigenSolver<Matrix6d> known(information);
   const double most = known.eigenvalues().maxCoeff();
-  if (!covariance.allFinite() || !(most > 0)) return kUnseen * Matrix6d::Identity();
+  if (!covariance.allFinite() || !(most > 0)) return kUnseenVariance * Matrix6d::Identity();
   const Vector6d unseen =
-      (known.eigenvalues().array() < kSeenShare * most).cast<double>() * kUnseen;
+      (known.eigenvalues().array() < kSeenShare * most).cast<double>() * kUnseenVariance;
   const auto& directions = known.eigenvectors();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> stated(0.5 * (covariance + covariance.transpose()));
   const Vector6d variances = stated.eigenvalues().cwiseAbs();
@@ -381,7 +376,7 @@ AlignmentResult Aligner::Align(const EdgePoints& points, const cv::Mat& grey,
   result.state.new_from_reference = Renormalised(result.state.new_from_reference);
   result.cost = cost;
   Summarise(points, camera, sigma, result);
-  CountExplained(points, result);
+  result.explained = CountExplained(points, current_, result.state.gain, kNoiseGrey);
   return result;
 }
 
@@ -400,19 +395,30 @@ float Aligner::PerSlope(const EdgePoints& points) const {
   return static_cast<float>(config_.place_sigma_px / config_.grey_sigma);
 }
 
-void Aligner::CountExplained(const EdgePoints& points, AlignmentResult& result) const {
-  const auto gain = static_cast<float>(result.state.gain);
+std::size_t Aligner::CountExplained(const EdgePoints& points, const Residuals& residuals,
+                                    double gain, double noise) const {
   const float per_slope = PerSlope(points);
+  const auto explained_px = kExplainedPx * static_cast<float>(gain);
+  std::size_t explained = 0;
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);
     const auto slope = AlignerPart(points.slope, begin, count);
-    const auto bound =
-        (gain * kExplainedPx * slope).max(kNoiseGrey) / (1 + (per_slope * slope).square()).sqrt();
-    result.explained += static_cast<std::size_t>(
-        ((AlignerPart(current_.value, begin, count).abs() <= bound).cast<float>() *
-         AlignerPart(current_.visible, begin, count))
+    const auto bound = (explained_px * slope).max(static_cast<float>(noise)) /
+                       (1 + (per_slope * slope).square()).sqrt();
+    explained += static_cast<std::size_t>(
+        ((AlignerPart(residuals.value, begin, count).abs() <= bound).cast<float>() *
+         AlignerPart(residuals.visible, begin, count))
             .sum());
   }
+  return explained;
+}
+
+std::size_t Aligner::ExplainedAt(const EdgePoints& points, const cv::Mat& grey,
+                                 const geo::CameraIntrinsics& camera, const AlignmentState& state,
+                                 double noise) {
+  Whiten(points, state.new_from_reference);
+  Evaluate(points, grey, camera, state, candidate_);
+  return CountExplained(points, candidate_, state.gain, noise);
 }
 
 /// As BuildNormalEquations with the variance of the noise in the place of the gradients' squares;
@@ -475,7 +481,7 @@ void Aligner::Summarise(const EdgePoints& points, const geo::CameraIntrinsics& c
       WithUnseen(parts / (parts - 1) / square_gain * whole.topLeftCorner<6, 6>(), pose);
   if (points.gradient_noise > 0) {
     const SeenMovements seen(pose, NoiseInformation(points, camera, sigma, kJaggedShare));
-    result.covariance = seen.Widened(result.covariance, kUnseen);
+    result.covariance = seen.Widened(result.covariance);
   }
 }
 

@@ -15,6 +15,9 @@
 
 namespace livemap::odometry {
 
+/// Residuals up to this are the noise of any camera, and are explained on any edge, grey levels.
+inline constexpr double kNoiseGrey = 8;
+
 /// What brings the reference's points and grey values into a new image.
 struct AlignmentState {
   Eigen::Isometry3d new_from_reference = Eigen::Isometry3d::Identity();
@@ -89,6 +92,12 @@ class Aligner {
   double CostAt(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera,
                 const AlignmentState& state, double sigma);
 
+  /// How many of the points `state` explains, see AlignmentResult, if residuals up to `noise` grey
+  /// levels are noise, instead of kNoiseGrey.
+  std::size_t ExplainedAt(const EdgePoints& points, const cv::Mat& grey,
+                          const geo::CameraIntrinsics& camera, const AlignmentState& state,
+                          double noise);
+
  private:
   static constexpr int kUnknowns = 8;  // Twist, gain, bias.
   using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
@@ -114,7 +123,8 @@ class Aligner {
   bool Solve(double damping, Step& step) const;
   AlignmentState Moved(const AlignmentState& state, const Step& step) const;
   float PerSlope(const EdgePoints& points) const;
-  void CountExplained(const EdgePoints& points, AlignmentResult& result) const;
+  std::size_t CountExplained(const EdgePoints& points, const Residuals& residuals, double gain,
+                             double noise) const;
   /// What the noise of the gradients alone adds to the pose's part of the normal equations, that
   /// of so large a share of each gradient included.
   Matrix6d NoiseInformation(const EdgePoints& points, const geo::CameraIntrinsics& camera,

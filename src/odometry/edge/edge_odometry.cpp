@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "common/time.h"
+#include "odometry/edge/seen_movements.h"
 
 namespace livemap::odometry {
 namespace {
@@ -15,47 +16,10 @@ namespace {
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
 constexpr double kMinCondition = 1e-12;
-/// Light that fades further than this, or grows, between two images is a covered lens.
-constexpr double kMinBelievedGain = 0.3;
 /// What a search finds must explain this much more to be preferred to what was there.
 constexpr double kBetterScore = 0.03;
 /// Of the newest frame in the mean of the agreements.
 constexpr double kAgreementShare = 0.2;
-
-/// A keyframe whose points lie in less than this share of the cells of its image takes faint edges,
-/// too: what is in one corner leaves the view at once, and says little while it is there. Where
-/// those are no more, its finest level is a coarser one that has so many times more.
-constexpr double kEnoughCovered = 0.4;
-constexpr double kBetterCovered = 1.5;
-constexpr int kCellsAcross = 8, kCellsDown = 6;
-/// Faint edges are as strong as this, grey levels per px, and their points as steep as this.
-constexpr double kFaintEdgeGradient = 2;
-constexpr float kFaintPointGradient = 0.8F;
-
-/// The cell at a part of the image's width or height, also where rounding puts that outside.
-int CellAt(double part, int cells) {
-  const double cell = part * cells;
-  return cell > 0 ? static_cast<int>(std::min(cell, cells - 1.0)) : 0;  // NaN is 0, too.
-}
-
-/// Share of the cells of the image that have points.
-double CoveredShare(const EdgePoints& points, const geo::CameraIntrinsics& camera) {
-  std::array<bool, kCellsAcross * kCellsDown> covered{};
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double u = camera.fx * static_cast<double>(points.x[i] / points.z[i]) + camera.cx;
-    const double v = camera.fy * static_cast<double>(points.y[i] / points.z[i]) + camera.cy;
-    const int column = CellAt(u / camera.width, kCellsAcross);
-    const int row = CellAt(v / camera.height, kCellsDown);
-    covered[static_cast<std::size_t>(row * kCellsAcross + column)] = true;
-  }
-  return static_cast<double>(std::count(covered.begin(), covered.end(), true)) /
-         static_cast<double>(covered.size());
-}
-
-EdgeExtractor::Config FaintEdges(EdgeExtractor::Config config) {
-  config.min_gradient = std::min(config.min_gradient, kFaintEdgeGradient);
-  return config;
-}
 
 /// The covariance of what a matrix makes of a vector with this one. Its variances are sums of
 /// squares: no rounding makes them negative.
@@ -89,9 +53,7 @@ const char* VoStateName(VoState state) {
 EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& intrinsics)
     : config_(config),
       cameras_(LevelCamerasOf(CheckedCamera(intrinsics))),
-      extractor_(config.edges),
-      faint_extractor_(FaintEdges(config.edges)),
-      selector_(config.points.seed),
+      selector_({config.edges, config.points, config.max_points}, cameras_),
       aligner_(config.alignment),
       rotation_aligner_(OdometryOfRotationOnly(config.alignment)),
       wide_search_(config.alignment, cameras_) {}
@@ -106,15 +68,20 @@ void EdgeOdometry::Reset() {
   last_stamp_ns_.reset();
   light_ = {};
   settled_ = false;
+  ForgetCourses();
   ambiguous_frames_ = 0;
   searched_keyframes_ = 0;
   ForgetUsual();
 }
 
 void EdgeOdometry::ForgetUsual() {
-  usual_agreement_ = agreement_deviation_ = 0;
-  usual_surfaces_ = kSurfacesAtFirst;
-  surface_deviation_ = 0;
+  agreement_.Forget();
+  surfaces_.Forget();
+}
+
+void EdgeOdometry::ForgetCourses() {
+  course_.reset();
+  rival_course_.reset();
 }
 
 void EdgeOdometry::Check(const RgbdFrame& frame) const {
@@ -167,6 +134,8 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
   last_.state = VoState::kTracking;
   last_.twist = twist;
   settled_ = twist.has_value();
+  ForgetCourses();
+  if (twist) course_ = Course{last_.world_from_camera, *twist};
   tracked_stamp_ns_ = *last_stamp_ns_;
   return true;
 }
@@ -174,6 +143,8 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
 void EdgeOdometry::Correct(const Eigen::Isometry3d& said_from_true, double since_s) {
   last_.world_from_camera = last_.world_from_camera * said_from_true;
   if (last_.twist) *last_.twist += Se3Log(said_from_true) / since_s;
+  ForgetCourses();
+  if (last_.twist) course_ = Course{last_.world_from_camera, *last_.twist};
 }
 
 bool EdgeOdometry::AddEarlierKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
@@ -209,7 +180,8 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
                          cameras_.camera[static_cast<std::size_t>(coarsest)]);
   }
   std::swap(fresh->images, frame_images_);
-  if (!SelectPoints(*fresh)) {
+  selector_.Select(*fresh);
+  if (fresh->finest_points().size() < static_cast<std::size_t>(config_.min_points)) {
     std::swap(fresh->images, frame_images_);
     spare_.push_back(std::move(fresh));
     return false;
@@ -245,10 +217,7 @@ void EdgeOdometry::ReserveBuffers() {
   const std::size_t most =
       std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
                                                                      config_.max_points.end())));
-  masked_points_.Reserve(most);
-  selector_.Reserve(frame_images_[0].total());
-  extractor_.Reserve(size);
-  faint_extractor_.Reserve(size);
+  selector_.Reserve(size);
   aligner_.Reserve(most);
   rotation_aligner_.Reserve(most);
   wide_search_.Reserve(most, thumbnail);
@@ -270,52 +239,10 @@ void EdgeOdometry::ForgetNearOnes() {
   keyframes_.erase(leaving);
 }
 
-bool EdgeOdometry::SelectPoints(Keyframe& keyframe) {
-  keyframe.finest_level = 0;
-  double best_covered = 0;
-  for (int level = 0; level < cameras_.levels; ++level) {
-    const double covered = std::min(kEnoughCovered, SelectPointsOf(level, keyframe));
-    if (level > 0 && covered < kBetterCovered * best_covered) continue;
-    keyframe.finest_level = level;
-    best_covered = covered;
-  }
-  selector_.SelectAll(keyframe.images.thumbnail(),
-                      cameras_.camera[static_cast<std::size_t>(cameras_.levels)],
-                      keyframe.thumbnail_points);
-  return keyframe.finest_points().size() >= static_cast<std::size_t>(config_.min_points);
-}
-
-/// The points of one level; the share of the image that they cover.
-double EdgeOdometry::SelectPointsOf(int level, Keyframe& keyframe) {
-  const auto index = static_cast<std::size_t>(level);
-  PointSelection selection = config_.points;
-  selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
-  const cv::Mat& grey = keyframe.images[level];
-  const ReferenceLevel reference = {grey, keyframe.depths[level],
-                                    keyframe.inverse_depth_sigmas[level]};
-  const geo::CameraIntrinsics& camera = cameras_.camera[index];
-  EdgePoints& points = keyframe.points[index];
-  selector_.Select(reference, extractor_.Extract(grey), camera, selection, points);
-  double covered = CoveredShare(points, camera);
-  if (covered < kEnoughCovered) {
-    selection.min_gradient = std::min(selection.min_gradient, kFaintPointGradient);
-    selector_.Select(reference, faint_extractor_.Extract(grey), camera, selection, points);
-    covered = CoveredShare(points, camera);
-  }
-  points.gradient_noise = keyframe.images.GradientNoise(level);
-  return covered;
-}
-
 const EdgePoints& EdgeOdometry::PointsOf(Keyframe& keyframe, int level) {
-  const auto index = static_cast<std::size_t>(level);
-  if (config_.edge_source == EdgeSource::kKeyframe) return keyframe.points[index];
-  PointSelection selection = config_.points;
-  selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
-  const ReferenceLevel reference = {keyframe.images[level], keyframe.depths[level],
-                                    keyframe.inverse_depth_sigmas[level]};
-  selector_.Select(reference, extractor_.Extract(frame_images_[level]), cameras_.camera[index],
-                   selection, masked_points_);
-  return masked_points_;
+  return config_.edge_source == EdgeSource::kKeyframe
+             ? keyframe.points[static_cast<std::size_t>(level)]
+             : selector_.SelectUnder(frame_images_[level], keyframe, level);
 }
 
 AlignmentState EdgeOdometry::BestStart(const EdgePoints& points, int level,
@@ -367,12 +294,11 @@ SurfaceConstraint EdgeOdometry::SurfacesOf(const Keyframe& keyframe) const {
 void EdgeOdometry::Judge(Attempt& attempt) const {
   attempt.surfaces =
       SurfacesOf(*attempt.keyframe).Agreement(attempt.fine.state.new_from_reference, 1);
-  attempt.good = IsGood(*attempt.keyframe, attempt.fine) &&
-                 attempt.surfaces.value_or(1) >= config_.min_surfaces;
+  attempt.good = IsGood(attempt);
 }
 
-/// Whether what a search found explains clearly more than what was there, of the edges and of the
-/// surfaces; both of one keyframe.
+/// Whether what a search found explains clearly more than what was followed, of the edges and of
+/// the surfaces; both of one keyframe.
 bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) const {
   const SurfaceConstraint surfaces = SurfacesOf(*followed.keyframe);
   const double bound =
@@ -384,54 +310,75 @@ bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) const
          ExplainedScore(followed.fine) * (both ? *there : 1) + kBetterScore;
 }
 
-/// Where the camera is now if its motion goes on as it was; none when that is not known.
-std::optional<Eigen::Isometry3d> EdgeOdometry::Predicted(std::int64_t stamp_ns) const {
+/// How far the keyframe's points move over the image between a motion and an attempt's, px.
+double EdgeOdometry::PixelsFrom(const Eigen::Isometry3d& new_from_reference,
+                                const Attempt& attempt) const {
+  return PixelsBetween(attempt.fine.state.new_from_reference, new_from_reference,
+                       attempt.keyframe->finest_points().mean_inverse_depth, cameras_.camera[0].fx);
+}
+
+/// Who is believed. One of two motions that a search cannot tell apart is not told apart from what
+/// was followed either.
+EdgeOdometry::Attempt EdgeOdometry::Better(const Attempt& found, const Attempt& followed) const {
+  if (!found.good) return followed;
+  if (!followed.good || IsBetter(found, followed)) return found;
+  if (!found.ambiguous) return followed;
+  Attempt either = found;
+  if (PixelsFrom(followed.fine.state.new_from_reference, found) > kRivalPx) {
+    either.rival = followed.fine;
+  }
+  return either;
+}
+
+/// Where the camera is most likely now: its motion goes on as it was, or it stands.
+Eigen::Isometry3d EdgeOdometry::Expected(std::int64_t stamp_ns) const {
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
-  if (!last_.twist || step_s > kMaxPredictionS) return std::nullopt;
-  return last_.world_from_camera * Se3Exp(*last_.twist * step_s);
+  const bool moves = course_ && step_s <= kMaxPredictionS;
+  return moves ? course_->After(step_s) : last_.world_from_camera;
+}
+
+/// The same; none where the last motion was not told apart from all others.
+std::optional<Eigen::Isometry3d> EdgeOdometry::Predicted(std::int64_t stamp_ns) const {
+  const bool is_known =
+      settled_ && course_ && Seconds(stamp_ns - *last_stamp_ns_) <= kMaxPredictionS;
+  return is_known ? std::optional(Expected(stamp_ns)) : std::nullopt;
 }
 
 EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
   // The thesis's equation 5.7: the motion goes on as it was; or the camera stands.
   Guesses guesses;
-  const auto predicted = Predicted(stamp_ns);
-  if (config_.constant_motion && predicted) {
-    guesses.Add(predicted->inverse() * keyframe_->world_from_camera);
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
+  if (config_.constant_motion && step_s <= kMaxPredictionS) {
+    for (const std::optional<Course>& course : {course_, rival_course_}) {
+      if (course) guesses.Add(course->After(step_s).inverse() * keyframe_->world_from_camera);
+    }
   }
   guesses.Add(last_.world_from_camera.inverse() * keyframe_->world_from_camera);
   const Attempt followed = TrackFrom(*keyframe_, guesses);
   if (!IsDoubtful(followed, stamp_ns)) return followed;
   if (followed.good) guesses.Add(followed.fine.state.new_from_reference);
-  const Attempt found = SearchFrom(*keyframe_, guesses);
-  const bool is_taken =
-      found.good && (!followed.good || found.ambiguous || IsBetter(found, followed));
-  Attempt attempt = is_taken ? found : followed;
+  Attempt attempt = Better(SearchFrom(*keyframe_, guesses), followed);
   TellApart(stamp_ns, attempt);
   CastDoubt(stamp_ns, attempt);
   return attempt;
 }
 
-/// Of two motions that explain as much, the one that goes on as the last one did is believed when
-/// the other is twice as far from that. Only a motion that was told apart predicts.
+/// Of two motions that explain as much, the one that is as expected is believed when the other is
+/// twice as far from that. Only a motion that was told apart itself tells others apart.
 void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
-  const auto predicted = Predicted(stamp_ns);
-  if (!attempt.ambiguous || !predicted || !settled_) return;
-  const Eigen::Isometry3d expected = predicted->inverse() * attempt.keyframe->world_from_camera;
-  const double inverse_depth = attempt.keyframe->finest_points().mean_inverse_depth;
-  const double focal_px = cameras_.camera[0].fx;
-  const auto surprise = [&](const AlignmentResult& result) {
-    return PixelsBetween(result.state.new_from_reference, expected, inverse_depth, focal_px);
-  };
-  const double of_winner = surprise(attempt.fine), of_rival = surprise(attempt.rival);
-  if (of_rival > 2 * of_winner) {
-    attempt.ambiguous = false;
-  } else if (of_winner > 2 * of_rival) {
-    Attempt other = attempt;
-    std::swap(other.fine, other.rival);
-    other.ambiguous = false;
-    Judge(other);
-    if (other.good) attempt = other;
+  if (!attempt.ambiguous) return;
+  const Eigen::Isometry3d expected =
+      Expected(stamp_ns).inverse() * attempt.keyframe->world_from_camera;
+  Attempt other = attempt;
+  std::swap(other.fine, other.rival);
+  Judge(other);
+  const double of_winner = PixelsFrom(expected, attempt), of_rival = PixelsFrom(expected, other);
+  if (other.good && of_winner > 2 * of_rival) {
+    attempt = other;
+  } else if (of_rival <= 2 * of_winner) {
+    return;
   }
+  attempt.ambiguous = !Predicted(stamp_ns);
 }
 
 /// A motion found by a search may be strange all the same, and far from what was expected: a false
@@ -440,25 +387,19 @@ void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
 void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
   const bool unlike =
-      attempt.fine.Agreement() < usual_agreement_ - std::max(config_.strange_drop, UsualDrop());
+      attempt.fine.Agreement() < agreement_.value() - std::max(config_.strange_drop, UsualDrop());
   if (!IsDisplaced(attempt) && !unlike) return;
   Eigen::Isometry3d& rival = attempt.rival.state.new_from_reference;
-  rival = Predicted(stamp_ns).value_or(last_.world_from_camera).inverse() *
-          attempt.keyframe->world_from_camera;
-  attempt.ambiguous = attempt.strange =
-      PixelsBetween(attempt.fine.state.new_from_reference, rival,
-                    attempt.keyframe->finest_points().mean_inverse_depth,
-                    cameras_.camera[0].fx) > kRivalPx;
+  rival = Expected(stamp_ns).inverse() * attempt.keyframe->world_from_camera;
+  attempt.ambiguous = attempt.strange = PixelsFrom(rival, attempt) > kRivalPx;
 }
 
 /// By how much a frame's agreement may fall short of the last ones' without being strange.
-double EdgeOdometry::UsualDrop() const {
-  return std::max(config_.agreement_drop, 3 * agreement_deviation_);
-}
+double EdgeOdometry::UsualDrop() const { return agreement_.Drop(config_.agreement_drop); }
 
 /// The share of the surfaces below which a frame is strange.
 double EdgeOdometry::LeastSurfaces() const {
-  return usual_surfaces_ - std::max(config_.surface_drop, 3 * surface_deviation_);
+  return surfaces_.value() - surfaces_.Drop(config_.surface_drop);
 }
 
 /// Whether the depth of the frame contradicts the motion.
@@ -469,9 +410,10 @@ bool EdgeOdometry::IsDisplaced(const Attempt& attempt) const {
 /// Whether a place that was looked for without any prior looks as places did before.
 bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
   return attempt.good &&
-         attempt.fine.Agreement() >= usual_agreement_ - std::max(config_.found_drop, UsualDrop()) &&
+         attempt.fine.Agreement() >=
+             agreement_.value() - std::max(config_.found_drop, UsualDrop()) &&
          attempt.surfaces.value_or(1) >=
-             std::min(LeastSurfaces(), usual_surfaces_ - config_.found_drop);
+             std::min(LeastSurfaces(), surfaces_.value() - config_.found_drop);
 }
 
 /// Whether an alignment that began at a guess may have ended in a false minimum. The further a
@@ -479,7 +421,7 @@ bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
 /// the motion goes on as it was. Where depths are estimates, it says that the depths err.
 bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
   if (!attempt.good || !settled_) return true;
-  const double drop = usual_agreement_ - attempt.fine.Agreement();
+  const double drop = agreement_.value() - attempt.fine.Agreement();
   const bool exact = attempt.keyframe->finest_points().inverse_depth_sigma.empty();
   if (drop > (exact ? std::max(config_.found_drop, UsualDrop()) : UsualDrop())) return true;
   if (drop < UsualDrop() / 4 && !IsDisplaced(attempt)) return false;
@@ -522,8 +464,9 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeAround(*guesses.begin(), proposals);
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);
-  const double enough = std::max(config_.feature_agreement, usual_agreement_ - UsualDrop());
-  if (first.good && !first.ambiguous && first.fine.Agreement() >= enough && !IsDisplaced(first)) {
+  const double enough = std::max(config_.feature_agreement, agreement_.value() - UsualDrop());
+  if (first.good && settled_ && course_ && !first.ambiguous && first.fine.Agreement() >= enough &&
+      !IsDisplaced(first)) {
     return first;
   }
   proposals = {};
@@ -583,18 +526,20 @@ EdgeOdometry::Attempt EdgeOdometry::FindBack() {
   return attempt;
 }
 
-bool EdgeOdometry::IsGood(const Keyframe& keyframe, const AlignmentResult& result) const {
+bool EdgeOdometry::IsGood(const Attempt& attempt) const {
+  const AlignmentResult& result = attempt.fine;
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
+  const bool is_measured = attempt.surfaces.value_or(0) >= kSurfacesAtFirst;
   return std::isfinite(result.cost) &&
          IsBelievableMove(result.state.new_from_reference,
-                          keyframe.finest_points().mean_inverse_depth) &&
+                          attempt.keyframe->finest_points().mean_inverse_depth) &&
          result.state.new_from_reference.matrix().allFinite() &&
          determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
-         result.Overlap() >= config_.min_overlap && result.sigma <= config_.lost_sigma &&
-         result.Agreement() >= config_.min_agreement && result.state.gain > kMinBelievedGain &&
-         result.state.gain < 1 / kMinBelievedGain;
+         result.Overlap() >= (is_measured ? config_.min_measured_overlap : config_.min_overlap) &&
+         result.sigma <= config_.lost_sigma && result.Agreement() >= config_.min_agreement &&
+         attempt.surfaces.value_or(1) >= config_.min_surfaces && IsBelievableLight(result.state);
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
@@ -630,8 +575,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   light_.bias = fine.state.bias;
   VoResult result;
   result.state = VoState::kTracking;
-  const Eigen::Isometry3d reference_from_new = fine.state.new_from_reference.inverse();
-  result.world_from_camera = Renormalised(keyframe_->world_from_camera * reference_from_new);
+  result.world_from_camera = Renormalised(Continued(attempt, stamp_ns));
   // new_from_reference Exp(d) turned around is Exp(-d) reference_from_new: carried to the
   // right-hand side of the new pose by the adjoint.
   Matrix6d relative = config_.covariance_factor * fine.covariance;
@@ -649,17 +593,22 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   ambiguous_frames_ = attempt.ambiguous ? ambiguous_frames_ + 1 : 0;
   settled_ = ambiguous_frames_ == 0 || ambiguous_frames_ > config_.max_ambiguous_frames;
-  if (usual_agreement_ == 0) usual_agreement_ = fine.Agreement();
-  const double deviation = fine.Agreement() - usual_agreement_;
-  usual_agreement_ += kAgreementShare * deviation;
-  agreement_deviation_ += kAgreementShare * (std::abs(deviation) - agreement_deviation_);
-  if (attempt.surfaces) {
-    const double difference = *attempt.surfaces - usual_surfaces_;
-    usual_surfaces_ += kAgreementShare * difference;
-    surface_deviation_ += kAgreementShare * (std::abs(difference) - surface_deviation_);
+  agreement_.Add(fine.Agreement());
+  if (attempt.surfaces) surfaces_.Add(*attempt.surfaces);
+  ForgetCourses();
+  if (last_.state == VoState::kTracking) {
+    const auto course_to = [&](const Eigen::Isometry3d& world_from_camera) {
+      const Eigen::Isometry3d step = last_.world_from_camera.inverse() * world_from_camera;
+      return Course{world_from_camera, Se3Log(step) / step_s};
+    };
+    course_ = course_to(result.world_from_camera);
+    if (attempt.ambiguous) {
+      rival_course_ = course_to(keyframe_->world_from_camera *
+                                attempt.rival.state.new_from_reference.inverse());
+    }
   }
-  if (last_.state == VoState::kTracking && settled_) {
-    result.twist = Se3Log(last_.world_from_camera.inverse() * result.world_from_camera) / step_s;
+  if (course_ && settled_) {
+    result.twist = course_->twist;
     // Both ends err by the alignment with the keyframe.
     result.twist_covariance = 2 / (step_s * step_s) * Transformed(to_new, relative);
   }
@@ -672,6 +621,17 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.surfaces = attempt.surfaces;
   result.iterations = attempt.iterations;
   return result;
+}
+
+/// The pose of an attempt. What nothing shows of it goes on as it was, or stays where it was if
+/// that is not known, instead of wherever noise brought it.
+Eigen::Isometry3d EdgeOdometry::Continued(const Attempt& attempt, std::int64_t stamp_ns) const {
+  const AlignmentResult& fine = attempt.fine;
+  const Eigen::Isometry3d said =
+      attempt.keyframe->world_from_camera * fine.state.new_from_reference.inverse();
+  const Matrix6d covariance =
+      Transformed(Se3Adjoint(fine.state.new_from_reference), fine.covariance);
+  return said * Se3Exp(UnseenPart(Se3Log(said.inverse() * Expected(stamp_ns)), covariance));
 }
 
 /// What no edge shows is not further away than a camera may move in that time.
@@ -688,6 +648,7 @@ Matrix6d EdgeOdometry::WithinReach(const Matrix6d& covariance, double time_s) co
 VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
   VoResult result = last_;
   result.state = VoState::kLost;
+  ForgetCourses();
   result.twist.reset();
   result.twist_covariance.setZero();
   result.new_keyframe = false;

@@ -10,7 +10,9 @@
 #include "odometry/edge/aligner.h"
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/keyframe.h"
+#include "odometry/edge/keyframe_point_selector.h"
 #include "odometry/edge/rgbd_frame.h"
+#include "odometry/edge/usual_share.h"
 #include "odometry/edge/wide_search.h"
 
 namespace livemap::odometry {
@@ -81,8 +83,10 @@ class EdgeOdometry {
 
     /// Tracking is lost with fewer points in view than this,
     int min_points = 150;
-    /// a smaller share of them,
+    /// a smaller share of them, or than the second if the surfaces in view are where they should
+    /// be,
     double min_overlap = 0.25;
+    double min_measured_overlap = 0.12;
     /// or residuals of this standard deviation, grey levels.
     double lost_sigma = 30;
     /// or when less than this share of the points in view is explained.
@@ -90,11 +94,10 @@ class EdgeOdometry {
     /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
     double min_surfaces = 0.5;
     /// An alignment is doubted, and the motion searched widely, when its agreement is smaller by
-    /// this than what the last frames had, and by three times their mean deviation, while the
-    /// points are further than half of `surprise` from where the last motion brings them,
+    /// this than what the last frames had, and by more than UsualShare allows, while the points are
+    /// further than half of `surprise` from where the last motion brings them,
     double agreement_drop = 0.04;
-    /// or when so much less of the surfaces is where it should be than in the last frames, and
-    /// less by three times their mean deviation,
+    /// or when so much less of the surfaces is where it should be than in the last frames,
     double surface_drop = 0.05;
     /// A motion that was searched and agrees by so much less than the last frames is as doubtful as
     /// an ambiguous one.
@@ -179,6 +182,14 @@ class EdgeOdometry {
     const Eigen::Isometry3d* begin() const { return new_from_reference.data(); }
     const Eigen::Isometry3d* end() const { return new_from_reference.data() + count; }
   };
+  /// Where the camera may be, and how it moves if it is.
+  struct Course {
+    Eigen::Isometry3d world_from_camera;
+    Vector6d twist;
+    Eigen::Isometry3d After(double time_s) const {
+      return world_from_camera * Se3Exp(twist * time_s);
+    }
+  };
   struct Attempt {
     Keyframe* keyframe = nullptr;
     AlignmentResult fine;
@@ -192,13 +203,12 @@ class EdgeOdometry {
 
   bool MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
                     const VoResult& result);
-  bool SelectPoints(Keyframe& keyframe);
-  double SelectPointsOf(int level, Keyframe& keyframe);
   Attempt TrackFrom(Keyframe& keyframe, const Guesses& guesses);
   AlignmentState BestStart(const EdgePoints& points, int level, const Guesses& guesses);
   const EdgePoints& PointsOf(Keyframe& keyframe, int level);
   Eigen::Isometry3d RotationGuess(Keyframe& keyframe, const Eigen::Isometry3d& from);
   Attempt Follow(std::int64_t stamp_ns);
+  Eigen::Isometry3d Expected(std::int64_t stamp_ns) const;
   std::optional<Eigen::Isometry3d> Predicted(std::int64_t stamp_ns) const;
   double UsualDrop() const;
   double LeastSurfaces() const;
@@ -214,28 +224,29 @@ class EdgeOdometry {
   SurfaceConstraint SurfacesOf(const Keyframe& keyframe) const;
   void Judge(Attempt& attempt) const;
   bool IsBetter(const Attempt& found, const Attempt& followed) const;
-  bool IsGood(const Keyframe& keyframe, const AlignmentResult& result) const;
+  Attempt Better(const Attempt& found, const Attempt& followed) const;
+  double PixelsFrom(const Eigen::Isometry3d& new_from_reference, const Attempt& attempt) const;
+  bool IsGood(const Attempt& attempt) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
   double Motion(const Keyframe& keyframe, const Eigen::Isometry3d& world_from_one,
                 const Eigen::Isometry3d& world_from_other) const;
   void ForgetNearOnes();
   void ReserveBuffers();
   void ForgetUsual();
+  void ForgetCourses();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
+  Eigen::Isometry3d Continued(const Attempt& attempt, std::int64_t stamp_ns) const;
   Matrix6d WithinReach(const Matrix6d& covariance, double time_s) const;
   VoResult Hold(std::int64_t stamp_ns);
 
   Config config_;
   LevelCameras cameras_;
-  EdgeExtractor extractor_;
-  EdgeExtractor faint_extractor_;  // Of keyframes with too few edges.
-  PointSelector selector_;
+  KeyframePointSelector selector_;
   Aligner aligner_, rotation_aligner_;
   WideSearch wide_search_;
   PictureFeatures frame_features_;
   RgbdFrame frame_;  // The last one, as it was given.
   ImagePyramid frame_images_;
-  EdgePoints masked_points_;
 
   std::vector<std::unique_ptr<Keyframe>> keyframes_;  // In use, oldest first.
   std::vector<std::unique_ptr<Keyframe>> spare_;
@@ -245,12 +256,12 @@ class EdgeOdometry {
   std::size_t searched_keyframes_ = 0;  // By a camera that is lost.
   int ambiguous_frames_ = 0;            // In a row.
   bool settled_ = false;                // Whether the last motion was told apart from all others.
-  double usual_agreement_ = 0;          // Of the last frames,
-  double agreement_deviation_ = 0;      // and how much they differ from it.
-  double usual_surfaces_ = kSurfacesAtFirst;  // The same of the surfaces.
-  double surface_deviation_ = 0;
-  AlignmentState light_;  // Gain and bias of the last frame.
+  UsualShare agreement_;                // Of the edges,
+  UsualShare surfaces_{kSurfacesAtFirst};  // and of the surfaces.
+  AlignmentState light_;                   // Gain and bias of the last frame.
 
+  /// After the last frame, where it is known; the second one if that was ambiguous.
+  std::optional<Course> course_, rival_course_;
   VoResult last_;
   std::optional<std::int64_t> last_stamp_ns_;
   std::int64_t tracked_stamp_ns_ = 0;

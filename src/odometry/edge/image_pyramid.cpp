@@ -136,6 +136,16 @@ geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics) 
           intrinsics.height / 2};
 }
 
+LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest) {
+  LevelCameras cameras;
+  cameras.camera[0] = finest;
+  cameras.levels = CountLevels({finest.width, finest.height});
+  for (std::size_t level = 1; level < cameras.camera.size(); ++level) {
+    cameras.camera[level] = HalvedIntrinsics(cameras.camera[level - 1]);
+  }
+  return cameras;
+}
+
 void ImagePyramid::Build(const cv::Mat& grey) {
   gradient_noise_ = {};
   levels_ = CountLevels(grey.size());

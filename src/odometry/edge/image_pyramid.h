@@ -21,6 +21,13 @@ int CountLevels(cv::Size size);
 /// pixel moves by half a pixel.
 geo::CameraIntrinsics HalvedIntrinsics(const geo::CameraIntrinsics& intrinsics);
 
+/// The cameras of an image's levels.
+struct LevelCameras {
+  std::array<geo::CameraIntrinsics, kMaxLevels + 1> camera;  ///< The last one is the thumbnail's.
+  int levels = 1;
+};
+LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest);
+
 /// Grey images, CV_8UC1. The buffers are kept from frame to frame.
 class ImagePyramid {
  public:

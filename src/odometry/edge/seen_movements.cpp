@@ -2,13 +2,34 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 
 namespace livemap::odometry {
 namespace {
 
 constexpr double kMostNoise = 0.5;
+/// A variance above this is nobody's error but that of a movement that is not seen.
+constexpr double kMostSeenVariance = 0.01 * kUnseenVariance;
+/// A camera turns by two radians as easily as it moves by a metre.
+constexpr double kMetresPerRadian = 0.5;
 
 }  // namespace
+
+Vector6d UnseenPart(const Vector6d& difference, const Matrix6d& covariance) {
+  if (!covariance.allFinite()) return Vector6d::Zero();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> known(covariance);
+  Vector6d metres = Vector6d::Ones();
+  metres.tail<3>().setConstant(kMetresPerRadian);
+  // Eigenvalues are in rising order, so that the last columns are unseen. The shortest change of
+  // the pose is looked for, with turns in metres.
+  const auto unseen = (known.eigenvalues().array() > kMostSeenVariance).count();
+  if (unseen == 0) return Vector6d::Zero();
+  const Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6> directions =
+      metres.asDiagonal() * known.eigenvectors().rightCols(unseen);
+  const Vector6d along =
+      directions * directions.colPivHouseholderQr().solve(metres.cwiseProduct(difference));
+  return along.cwiseQuotient(metres);
+}
 
 SeenMovements::SeenMovements(const Matrix6d& information, const Matrix6d& noise_information) {
   if (!information.allFinite() || !noise_information.allFinite()) return;
@@ -33,7 +54,7 @@ Vector6d SeenMovements::Told(const Vector6d& step) const {
   return twist_from_coordinates_ * IsSeen().cwiseProduct(coordinates_from_twist_ * step);
 }
 
-Matrix6d SeenMovements::Widened(const Matrix6d& covariance, double unseen_variance) const {
+Matrix6d SeenMovements::Widened(const Matrix6d& covariance) const {
   if (!is_known_) return covariance;
   const Vector6d seen = IsSeen();
   const Matrix6d widening = twist_from_coordinates_ * seen.asDiagonal() * coordinates_from_twist_;
@@ -41,7 +62,7 @@ Matrix6d SeenMovements::Widened(const Matrix6d& covariance, double unseen_varian
   for (int i = 0; i < 6; ++i) {
     if (seen[i] > 0) continue;
     const Vector6d direction = twist_from_coordinates_.col(i).normalized();
-    widened += unseen_variance * direction * direction.transpose();
+    widened += kUnseenVariance * direction * direction.transpose();
   }
   return widened;
 }

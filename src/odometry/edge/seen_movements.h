@@ -4,6 +4,14 @@
 
 namespace livemap::odometry {
 
+/// What a covariance says of movements that nothing shows, square metres and radians: all but
+/// nothing.
+inline constexpr double kUnseenVariance = 100;
+
+/// The part of a difference between two poses, a twist, that movements explain of which their
+/// covariance knows nothing (see kUnseenVariance).
+Vector6d UnseenPart(const Vector6d& difference, const Matrix6d& covariance);
+
 /// Tells the movements of a camera that its edges show from those of which the normal equations of
 /// an alignment know by the noise of the gradients alone: along stripes, say.
 ///
@@ -25,8 +33,8 @@ class SeenMovements {
   bool All() const;
   /// A step without its part along unseen movements.
   Vector6d Told(const Vector6d& step) const;
-  /// The covariance of a step, m^2 and rad^2, with `unseen_variance` along unseen movements.
-  Matrix6d Widened(const Matrix6d& covariance, double unseen_variance) const;
+  /// The covariance of a step, m^2 and rad^2, with kUnseenVariance along unseen movements.
+  Matrix6d Widened(const Matrix6d& covariance) const;
 
  private:
   Vector6d IsSeen() const;  // 1 or 0.

@@ -12,6 +12,8 @@ namespace {
 
 /// No move of which half of the picture is left is longer.
 constexpr double kMostMeanDepths = 1.5;
+/// Light that fades further than this, or grows, between two images is a covered lens.
+constexpr double kMinBelievedGain = 0.3;
 /// Weight of a point out of view, against one in view that is not explained.
 constexpr double kUnseenWeight = 0.3;
 /// Candidates that go on from the coarsest level, and from each finer one.
@@ -21,6 +23,10 @@ constexpr std::size_t kFineSurvivors = 3;
 constexpr double kSameCandidatePx = 1.5;
 /// A rival whose score is this close to the best one's makes the outcome ambiguous.
 constexpr double kAmbiguousScore = 0.03;
+/// Who explains less than the best by more than this does not say what noise is; that is so many
+/// times the root of the mean cost.
+constexpr double kNearlyAsMuch = 0.1;
+constexpr double kNoiseSigmas = 3;
 /// Of ProposeAround, rad, and how many turns of each.
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;
@@ -41,16 +47,6 @@ Eigen::Isometry3d MotionOfTwist(double vx, double vy, double vz, double wx, doub
 
 }  // namespace
 
-LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest) {
-  LevelCameras cameras;
-  cameras.camera[0] = finest;
-  cameras.levels = CountLevels({finest.width, finest.height});
-  for (std::size_t level = 1; level < cameras.camera.size(); ++level) {
-    cameras.camera[level] = HalvedIntrinsics(cameras.camera[level - 1]);
-  }
-  return cameras;
-}
-
 double ExplainedScore(const AlignmentResult& result) {
   const auto visible = static_cast<double>(result.visible);
   const double counted = visible + kUnseenWeight * (static_cast<double>(result.points) - visible);
@@ -60,6 +56,10 @@ double ExplainedScore(const AlignmentResult& result) {
 
 bool IsBelievableMove(const Eigen::Isometry3d& motion, double mean_inverse_depth) {
   return motion.translation().norm() * mean_inverse_depth < kMostMeanDepths;
+}
+
+bool IsBelievableLight(const AlignmentState& state) {
+  return state.gain > kMinBelievedGain && state.gain < 1 / kMinBelievedGain;
 }
 
 double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,
@@ -134,13 +134,15 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
     candidate.result = aligner_.Align(points, grey, camera, candidate.result.state, surfaces,
                                       SurfacesEvery(is_finest));
     const bool is_believable =
-        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth);
+        IsBelievableMove(candidate.result.state.new_from_reference, points.mean_inverse_depth) &&
+        IsBelievableLight(candidate.result.state);
     candidate.score = is_believable ? ExplainedScore(candidate.result) : 0;
     // On coarser levels the motions are not exact enough for a narrow bound.
     if (is_believable && is_finest) {
       least_sigma = std::min(least_sigma, candidate.result.surface_sigma);
     }
   }
+  if (is_finest) AskNoise(points, grey, camera);
   AskSurfaces(surfaces, SurfaceBound(least_sigma));
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
@@ -156,6 +158,27 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
     if (!known) candidates_[kept++] = candidates_[i];
   }
   count_ = kept;
+}
+
+/// Where a motion that explains nearly as much as the best leaves less than the noise of any
+/// camera, this camera's noise is less: what others leave beyond it is not explained.
+void WideSearch::AskNoise(const EdgePoints& points, const cv::Mat& grey,
+                          const geo::CameraIntrinsics& camera) {
+  double best = 0, least_cost = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count_; ++i) best = std::max(best, candidates_[i].score);
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (candidates_[i].score < best - kNearlyAsMuch) continue;
+    least_cost = std::min(least_cost, candidates_[i].result.cost);
+  }
+  const double noise = kNoiseSigmas * std::sqrt(least_cost);
+  if (!(noise < kNoiseGrey)) return;
+  for (std::size_t i = 0; i < count_; ++i) {
+    Candidate& candidate = candidates_[i];
+    if (candidate.score == 0) continue;
+    AlignmentResult by_noise = candidate.result;
+    by_noise.explained = aligner_.ExplainedAt(points, grey, camera, by_noise.state, noise);
+    candidate.score = ExplainedScore(by_noise);
+  }
 }
 
 /// Multiplies the scores by the share of the surfaces that agree. Who looks where nothing is

@@ -34,18 +34,11 @@ class MotionProposals {
 /// motion with its error.
 inline constexpr double kRivalPx = 10;
 
-/// The cameras of an image's levels.
-struct LevelCameras {
-  std::array<geo::CameraIntrinsics, kMaxLevels + 1> camera;  ///< The last one is the thumbnail's.
-  int levels = 1;
-};
-LevelCameras LevelCamerasOf(const geo::CameraIntrinsics& finest);
-
 /// Looks for a motion of which nothing is known: many alignments on the coarsest level, of which
 /// the best go on to the finer ones. The winner is who explains the largest share of the edges,
 /// times the share of the surfaces that agree, so that a false minimum loses to the true one even
-/// where both are minima. Keeps its buffers; not
-/// thread-safe.
+/// where both are minima; what counts as explained depends on how little the best leave. Keeps its
+/// buffers; not thread-safe.
 class WideSearch {
  public:
   struct Outcome {
@@ -97,6 +90,7 @@ class WideSearch {
     double score = 0;
   };
 
+  void AskNoise(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera);
   void Refine(const EdgePoints& points, const cv::Mat& grey, int level, const Reference& reference);
 
   Aligner aligner_;
@@ -113,6 +107,10 @@ double ExplainedScore(const AlignmentResult& result);
 /// Whether a motion leaves the points in sight: from far away all of them fall into one pixel,
 /// which explains any of low contrast.
 bool IsBelievableMove(const Eigen::Isometry3d& motion, double mean_inverse_depth);
+
+/// Whether the light changed by so little that the picture shows the same: light that fades further
+/// is a covered lens, or explains any picture of low contrast.
+bool IsBelievableLight(const AlignmentState& state);
 
 /// How far points at `mean_inverse_depth` (1/m) move over the image between two motions, px.
 double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& other,

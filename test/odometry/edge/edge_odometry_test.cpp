@@ -342,24 +342,32 @@ TEST(EdgeOdometry, StraightEdgesAllOneWayDoNotFixThePose) {
   }
 }
 
-/// A wall of stripes 2 m away, one ray per pixel, seen from so far to the right. They lean to the
-/// right by so much per metre down.
-RgbdFrame SeeStripes(int frame, double right_m, double lean, cv::RNG& random) {
-  RgbdFrame stripes;
-  stripes.stamp_ns = Stamp(frame);
-  stripes.depth = cv::Mat(480, 640, CV_32FC1, cv::Scalar(2));
-  stripes.grey.create(480, 640, CV_8UC1);
+/// A wall 2 m away, one ray per pixel, seen from so far to the right and so far down; `is_light`
+/// says of a place on it, in metres, which of two grey values it has.
+template <typename IsLight>
+RgbdFrame SeeWall(int frame, double right_m, double down_m, cv::RNG& random, IsLight is_light) {
+  RgbdFrame wall;
+  wall.stamp_ns = Stamp(frame);
+  wall.depth = cv::Mat(480, 640, CV_32FC1, cv::Scalar(2));
+  wall.grey.create(480, 640, CV_8UC1);
   for (int v = 0; v < 480; ++v) {
     for (int u = 0; u < 640; ++u) {
-      const double x = right_m + 2 * (u - 319.5) / 525, y = 2 * (v - 239.5) / 525;
-      const bool is_light = static_cast<int>(std::floor((x + lean * y) / 0.21)) % 2 == 0;
-      stripes.grey.at<std::uint8_t>(v, u) = is_light ? 150 : 90;
+      const double x = right_m + 2 * (u - 319.5) / 525, y = down_m + 2 * (v - 239.5) / 525;
+      wall.grey.at<std::uint8_t>(v, u) = is_light(x, y) ? 150 : 90;
     }
   }
-  cv::Mat noise(stripes.grey.size(), CV_16SC1);
+  cv::Mat noise(wall.grey.size(), CV_16SC1);
   random.fill(noise, cv::RNG::NORMAL, 0, 1);
-  cv::add(stripes.grey, noise, stripes.grey, cv::noArray(), CV_8U);
-  return stripes;
+  cv::add(wall.grey, noise, wall.grey, cv::noArray(), CV_8U);
+  return wall;
+}
+
+bool IsOdd(double metres) { return static_cast<int>(std::floor(metres / 0.21)) % 2 != 0; }
+
+/// Stripes that lean to the right by so much per metre down.
+RgbdFrame SeeStripes(int frame, double right_m, double lean, cv::RNG& random) {
+  return SeeWall(frame, right_m, 0, random,
+                 [lean](double x, double y) { return !IsOdd(x + lean * y); });
 }
 
 TEST(EdgeOdometry, StripesDoNotMoveTheCameraAlongThem) {
@@ -369,6 +377,23 @@ TEST(EdgeOdometry, StripesDoNotMoveTheCameraAlongThem) {
     const VoResult result = odometry.Track(SeeStripes(i, 0.012 * i, 0, random));
     ASSERT_EQ(result.state, VoState::kTracking) << i;
     EXPECT_LT(std::abs(result.world_from_camera.translation().y()), 0.05) << i;
+  }
+}
+
+TEST(EdgeOdometry, WhatStripesDoNotShowGoesOnAsItWas) {
+  // At the left the stripes have a pattern; the camera sinks while it goes to the right.
+  EdgeOdometry odometry({}, {525, 525, 319.5, 239.5, 640, 480});
+  cv::RNG random(3);
+  const auto is_light = [](double x, double y) {
+    return IsOdd(x) != (x < 0 && IsOdd(y) != IsOdd(0.6 * y));
+  };
+  for (int i = 0; i < 30; ++i) {
+    RgbdFrame wall = SeeWall(i, 0.07 * i, 0.02 * i, random, is_light);
+    cv::GaussianBlur(wall.grey, wall.grey, {5, 5}, 0);
+    const VoResult result = odometry.Track(wall);
+    ASSERT_EQ(result.state, VoState::kTracking) << i;
+    EXPECT_NEAR(result.world_from_camera.translation().x(), 0.07 * i, 0.02) << i;
+    EXPECT_NEAR(result.world_from_camera.translation().y(), 0.02 * i, 0.006) << i;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace livemap::odometry {
@@ -17,7 +18,7 @@ TEST(SeenMovements, WithoutNoiseEverythingIsSeenAndTheCovarianceStays) {
   EXPECT_TRUE(seen.All());
   EXPECT_TRUE(seen.Told(step).isApprox(step));
   const Matrix6d covariance = Diagonal(6, 5, 4, 3, 2, 1);
-  EXPECT_TRUE(seen.Widened(covariance, 100).isApprox(covariance));
+  EXPECT_TRUE(seen.Widened(covariance).isApprox(covariance));
 }
 
 TEST(SeenMovements, WhatIsMostlyNoiseIsNotMovedAndHasTheVarianceOfTheUnseen) {
@@ -26,7 +27,7 @@ TEST(SeenMovements, WhatIsMostlyNoiseIsNotMovedAndHasTheVarianceOfTheUnseen) {
   const Vector6d told = seen.Told(Vector6d::Ones());
   EXPECT_NEAR(told[0], 1, 1e-12);
   EXPECT_NEAR(told[1], 0, 1e-12);
-  const Matrix6d widened = seen.Widened(0.01 * Matrix6d::Identity(), 100);
+  const Matrix6d widened = seen.Widened(0.01 * Matrix6d::Identity());
   EXPECT_NEAR(widened(1, 1), 100, 1e-9);
   EXPECT_NEAR(widened(0, 0), 0.01, 1e-9);
 }
@@ -47,8 +48,33 @@ TEST(SeenMovements, InformationThatTellsNothingChangesNothing) {
        {Matrix6d(Matrix6d::Zero()), Matrix6d(Matrix6d::Constant(nan))}) {
     const SeenMovements seen(information, Matrix6d::Identity());
     EXPECT_TRUE(seen.All());
-    EXPECT_TRUE(seen.Widened(Matrix6d::Identity(), 100).isIdentity());
+    EXPECT_TRUE(seen.Widened(Matrix6d::Identity()).isIdentity());
   }
+}
+
+TEST(UnseenPart, WhatIsSeenHasNone) {
+  EXPECT_TRUE(UnseenPart(Vector6d::Ones(), 1e-4 * Matrix6d::Identity()).isZero());
+}
+
+TEST(UnseenPart, IsThePartAlongAnUnseenMovement) {
+  const Vector6d difference = (Vector6d() << 1, -2, 3, 4, 5, 6).finished();
+  const Vector6d part =
+      UnseenPart(difference, Diagonal(1e-6, kUnseenVariance, 1e-6, 1e-6, 1e-6, 1e-6));
+  EXPECT_TRUE(part.isApprox(Vector6d(-2 * Vector6d::Unit(1)))) << part.transpose();
+}
+
+TEST(UnseenPart, OfAMovementAcrossTheAxesTakesTheNearest) {
+  const Vector6d direction = (Vector6d::Unit(0) + Vector6d::Unit(1)) / std::sqrt(2.0);
+  const Matrix6d covariance =
+      1e-6 * Matrix6d::Identity() + kUnseenVariance * direction * direction.transpose();
+  const Vector6d part = UnseenPart(Vector6d::Unit(0), covariance);
+  EXPECT_TRUE(part.isApprox(Vector6d(0.5 * (Vector6d::Unit(0) + Vector6d::Unit(1)))))
+      << part.transpose();
+}
+
+TEST(UnseenPart, OfACovarianceThatIsNoneIsNothing) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(UnseenPart(Vector6d::Ones(), Matrix6d::Constant(nan)).isZero());
 }
 
 }  // namespace

@@ -123,6 +123,20 @@ TEST(WideSearch, AStepOfAQuarterOfTheViewAlongStripesIsFollowed) {
   EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 20 / 30.0), 0.02);
 }
 
+TEST(WideSearch, AMotionThatWasFollowedIsNotForgottenOverTwoRivals) {
+  const MovingThroughRoom moving(267, RoomMotion::kFastTurn, 1);
+  EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 40 / 30.0), 0.01);
+}
+
+TEST(WideSearch, AnEdgeThatFadesToNothingIsNotExplained) {
+  AlignmentState state;
+  EXPECT_TRUE(IsBelievableLight(state));
+  state.gain = 0.25;
+  EXPECT_FALSE(IsBelievableLight(state));
+  state.gain = 4;
+  EXPECT_FALSE(IsBelievableLight(state));
+}
+
 TEST(WideSearch, AMoveThatBringsAllPointsIntoOnePixelIsNotBelieved) {
   EXPECT_TRUE(IsBelievableMove(Pose(0.4, 0, 1.5, 0, 0, 0.3), 0.5));
   EXPECT_FALSE(IsBelievableMove(Pose(0, 0, 40, 0, 0, 0), 0.5));
