@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/median.h"
 #include "common/time.h"
 #include "geo/datum.h"
 #include "geo/fix_plausibility.h"
-#include "localization/median.h"
 #include "localization/sliding_window.h"
 #include "localization/track_alignment.h"
 

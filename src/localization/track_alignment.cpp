@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "localization/median.h"
+#include "common/median.h"
 
 namespace livemap::localization {
 namespace {

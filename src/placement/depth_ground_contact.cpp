@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/median.h"
 #include "placement/road_ground_contact.h"
 
 namespace livemap::placement {
@@ -17,18 +18,11 @@ constexpr std::size_t kMinKnown = 6;
 constexpr double kMaxScatter = 0.1;   // Of the depth.
 constexpr double kMaxOffRoadM = 0.5;  // Above or below the road's plane, nearby,
 constexpr double kMaxSlope = 0.12;    // and per metre of distance: roads climb.
-constexpr double kMadToSigma = 1.4826;
 
 struct Statistics {
   double median_m = 0;
   double sigma_m = 0;  // Robust.
 };
-
-double MedianContactDepth(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// NaN where it is unknown.
 double ContactDepthAt(const DepthImage& image, int row, int column) {
@@ -50,9 +44,9 @@ std::optional<Statistics> MeasureContactDepth(const DepthImage& image, const cv:
   const double known = static_cast<double>(depths_m.size());
   if (depths_m.size() < kMinKnown || known < kMinKnownShare * inside.area()) return std::nullopt;
   Statistics statistics;
-  statistics.median_m = MedianContactDepth(depths_m);
+  statistics.median_m = TakeMedian(depths_m);
   for (double& depth_m : depths_m) depth_m = std::abs(depth_m - statistics.median_m);
-  statistics.sigma_m = kMadToSigma * MedianContactDepth(depths_m);
+  statistics.sigma_m = kMedianToSigma * TakeMedian(depths_m);
   return statistics;
 }
 

@@ -9,6 +9,7 @@
 #include "change/registration/change_region.h"
 #include "change/registration/road_alignment.h"
 #include "common/error.h"
+#include "common/median.h"
 #include "perception/inference/engines.h"
 #include "perception/inference/manifest_section.h"
 
@@ -116,10 +117,7 @@ class ExposureFit {
     for (std::size_t i = 0; i < from_.size(); ++i) {
       misfits.push_back(cv::norm(from_[i].mul(gain_) + offset_ - to_[i], cv::NORM_L1) / 3);
     }
-    std::vector<double> sorted = misfits;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double scale = 1.5 * std::max(*middle, 1.0);
+    const double scale = 1.5 * std::max(MedianOf(misfits), 1.0);
     for (std::size_t i = 0; i < misfits.size(); ++i) {
       const double ratio = misfits[i] / scale;
       weights_[i] = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));

@@ -10,6 +10,7 @@
 
 #include "change/registration/change_region.h"
 #include "common/error.h"
+#include "common/median.h"
 
 namespace livemap::change {
 namespace {
@@ -70,9 +71,7 @@ cv::Mat StructuredRoad(const cv::Mat& grey, const cv::Mat& road) {
     }
   }
   if (values.empty()) return road.clone();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return (energy > *middle) & road;
+  return (energy > TakeMedian(values)) & road;
 }
 
 /// Two views of a road, of which the earlier is moved round by round.

@@ -9,13 +9,14 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "common/median.h"
+
 namespace livemap::change {
 namespace {
 
 constexpr std::size_t kSample = 4;
 constexpr double kConfidence = 0.999;
 constexpr int kRefinements = 10;
-constexpr double kMedianToSigma = 1.4826;
 constexpr double kMinScalePx = 0.05;
 constexpr double kFar = 1e9;  // Squared pixels: agrees with nothing.
 
@@ -142,9 +143,7 @@ double RobustScaleOf(const std::vector<double>& errors, const std::vector<std::s
   std::vector<double> kept;
   kept.reserve(inliers.size());
   for (const std::size_t i : inliers) kept.push_back(errors[i]);
-  const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
-  std::nth_element(kept.begin(), middle, kept.end());
-  return std::max(kMedianToSigma * std::sqrt(*middle), kMinScalePx);
+  return std::max(kMedianToSigma * std::sqrt(TakeMedian(kept)), kMinScalePx);
 }
 
 /// Fits the inliers and takes in what then agrees, as long as none is lost.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/median.h"
 #include "common/time.h"
 #include "datasets/seeded_random.h"
 #include "evaluation/detection/detection_report.h"
@@ -63,9 +64,7 @@ std::int64_t MaxTrialIntervalNs(const std::vector<Stamped>& records) {
     intervals_ns.push_back(records[i].stamp_ns - records[i - 1].stamp_ns);
   }
   if (intervals_ns.empty()) return kLeastNs;
-  const auto middle = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 2);
-  std::nth_element(intervals_ns.begin(), middle, intervals_ns.end());
-  return std::max(kLeastNs, 2 * *middle);
+  return std::max(kLeastNs, 2 * TakeMedian(intervals_ns));
 }
 
 template <typename Stamped>

@@ -4,11 +4,11 @@
 #include <ros/console.h>
 #include <sensor_msgs/image_encodings.h>
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
 #include "common/error.h"
+#include "common/median.h"
 #include "nodelets/nodelet_support.h"
 #include "ros/conversions/camera_info_conversions.h"
 
@@ -154,8 +154,6 @@ void IngestStereo::Diagnose(Diagnostics::Status& status) {
     status.mergeSummary(Level::WARN, "right images are missing");
   }
   const StereoPairBuffer::Counters rights = rights_.counters();
-  const auto middle = milliseconds_.begin() + static_cast<std::ptrdiff_t>(milliseconds_.size() / 2);
-  std::nth_element(milliseconds_.begin(), middle, milliseconds_.end());
   status.add("right_in", rights.in);
   status.add("right_unpaired", rights.unpaired);
   status.add("right_stamps_refused", stamps_.refused());
@@ -165,7 +163,7 @@ void IngestStereo::Diagnose(Diagnostics::Status& status) {
   status.add("depth_dropped", counters.dropped - bad_ - missing_);
   status.add("depth_bad", bad_);
   status.add("depth_right_missing", missing_);
-  status.add("stereo_milliseconds_median", milliseconds_.empty() ? 0.0 : *middle);
+  status.add("stereo_milliseconds_median", milliseconds_.empty() ? 0.0 : TakeMedian(milliseconds_));
   milliseconds_.clear();
 }
 

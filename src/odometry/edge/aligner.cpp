@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "common/median.h"
 #include "odometry/bilinear.h"
 #include "odometry/edge/seen_movements.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
 constexpr double kMinVisibleShare = 0.1;
-constexpr double kMadToSigma = 1.4826;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
 constexpr float kNearestM = 0.01F;
@@ -164,7 +164,7 @@ double Aligner::RobustSigma(const Residuals& residuals) const {
   std::size_t seen = 0, bin = 0;
   while (bin < histogram.size() && 2 * (seen += histogram[bin]) < residuals.count) ++bin;
   const double median = (static_cast<double>(bin) + 0.5) / static_cast<double>(kBinsPerLevel);
-  return std::max(config_.min_sigma, kMadToSigma * median);
+  return std::max(config_.min_sigma, kMedianToSigma * median);
 }
 
 /// Mean of Huber's rho over the visible points, equation (3).

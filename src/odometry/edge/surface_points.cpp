@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "common/median.h"
 #include "odometry/se3.h"
 
 namespace livemap::odometry {
@@ -19,7 +20,6 @@ constexpr std::size_t kSurfaceMinMeasured = 60;
 /// How far to either side a point looks for the direction that its surface faces, px of the
 /// coarsest level: the noise of a depth camera tilts what is nearer.
 constexpr int kFacingReach = 3;
-constexpr double kMedianToSigmaOfSurfaces = 1.4826;
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 float SurfaceErrorAt(float depth_m) {
@@ -75,7 +75,7 @@ double SurfaceDistances::Sigma() const {
   }
   float* const median = magnitudes.data() + count / 2;
   std::nth_element(magnitudes.data(), median, magnitudes.data() + count);
-  return kMedianToSigmaOfSurfaces * static_cast<double>(*median);
+  return kMedianToSigma * static_cast<double>(*median);
 }
 
 double SurfaceDistances::ShareWithin(double bound) const {

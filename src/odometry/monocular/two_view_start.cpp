@@ -8,6 +8,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "common/median.h"
 #include "odometry/monocular/corner_motion.h"
 
 namespace livemap::odometry {
@@ -31,12 +32,6 @@ constexpr double kLonger = 1.2;
 Eigen::Vector2d LineOf(const Eigen::Vector3d& seen, const Eigen::Vector3d& translation,
                        double focal_px) {
   return focal_px / seen.z() * (translation.head<2>() - seen.hnormalized() * translation.z());
-}
-
-double MedianOfWays(std::vector<double>& ways) {
-  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
-  return *middle;
 }
 
 }  // namespace
@@ -153,7 +148,7 @@ double TwoViewStart::MedianMiss(const Eigen::Isometry3d& new_from_first) const {
         (Eigen::Matrix2d::Identity() + line * line.transpose() / second_line.squaredNorm());
     misses.push_back(miss.dot(covariance.inverse() * miss));
   }
-  return MedianOfWays(misses);
+  return TakeMedian(misses);
 }
 
 void TwoViewStart::KeepFollowed(const std::vector<cv::Point2f>& now,
@@ -176,7 +171,7 @@ double TwoViewStart::MedianWayPx() const {
     const cv::Point2f way = end_[i] - begin_[i];
     ways.push_back(std::hypot(way.x, way.y));
   }
-  return MedianOfWays(ways);
+  return TakeMedian(ways);
 }
 
 /// What the turn that explains the corners' ways best (Kabsch 1976, twice: the second time by those
@@ -201,7 +196,7 @@ double TwoViewStart::MedianParallaxPx() const {
       left[i] = camera_.fx * (seen.hnormalized() - now.hnormalized()).norm();
     }
     std::vector<double> ways = left;
-    limit_px = MedianOfWays(ways);
+    limit_px = TakeMedian(ways);
   }
   return limit_px;
 }

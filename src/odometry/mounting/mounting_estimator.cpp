@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/median.h"
+
 namespace livemap::odometry {
 namespace {
 
@@ -12,12 +14,6 @@ constexpr double kUnknownMounting = std::numeric_limits<double>::infinity();
 constexpr double kSteepestSlope = 2;  // Of what is taken for a direction of travel or a normal.
 constexpr double kTuning = 1.5;       // Huber's, standard deviations.
 constexpr int kMeanSteps = 8;
-
-double MedianOfCopy(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct RobustMean {
   double value = 0;
@@ -28,11 +24,11 @@ struct RobustMean {
 /// Huber's mean of values, which are not empty, with their own scatter but at least `least_spread`.
 RobustMean HuberMean(const std::vector<double>& values, double least_spread) {
   RobustMean mean;
-  mean.value = MedianOfCopy(values);
+  mean.value = MedianOf(values);
   std::vector<double> sizes;
   sizes.reserve(values.size());
   for (const double value : values) sizes.push_back(std::abs(value - mean.value));
-  mean.spread = std::max(least_spread, 1.4826 * MedianOfCopy(sizes));
+  mean.spread = std::max(least_spread, kMedianToSigma * MedianOf(sizes));
   for (int step = 0; step < kMeanSteps; ++step) {
     double sum = 0, weights = 0;
     for (const double value : values) {
@@ -174,7 +170,7 @@ std::optional<Eigen::Vector3d> MountingEstimator::TravelSoFar() const {
     y.insert(y.end(), config_.least_in_block, blocks_[i][kTravelY]);
   }
   if (x.size() < config_.least_in_block) return std::nullopt;
-  return Eigen::Vector3d(MedianOfCopy(x), MedianOfCopy(y), 1).normalized();
+  return Eigen::Vector3d(MedianOf(x), MedianOf(y), 1).normalized();
 }
 
 /// What the newest blocks, from `split` on, changed by, if that is no chance; else 0.

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "common/median.h"
 #include "odometry/bilinear.h"
 
 namespace livemap::odometry {
@@ -158,12 +159,6 @@ Eigen::Vector3d PlaneOfDepths(const std::vector<RoadDepth>& depths, const Eigen:
   return normal.ldlt().solve(right);
 }
 
-double MedianOf(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 RoadPlaneSearch::RoadPlaneSearch(const Config& config, const geo::CameraIntrinsics& camera)
@@ -227,7 +222,7 @@ double RoadPlaneSearch::Cost(const std::vector<Point>& points, const RoadView& v
         Interpolate(image, static_cast<float>(seen.u), static_cast<float>(seen.v)) - point.grey));
   }
   if (residuals.size() * 2 < points.size()) return std::numeric_limits<double>::infinity();
-  const double shift = MedianOf(residuals);
+  const double shift = TakeMedian(residuals);
   double sum = 0;
   for (const double residual : residuals) sum += std::min(30.0, std::abs(residual - shift));
   return sum / static_cast<double>(residuals.size());
@@ -270,7 +265,7 @@ std::optional<RoadPlaneSearch::Fit> RoadPlaneSearch::Align(const RoadView& view,
       sizes.push_back(std::abs(row.residual));
     }
     if (rows.size() < config_.min_points || rows.size() * 2 < points.size()) return std::nullopt;
-    const double sigma = std::max(kLeastPlaneSigma, 1.4826 * MedianOf(sizes));
+    const double sigma = std::max(kLeastPlaneSigma, kMedianToSigma * TakeMedian(sizes));
     Matrix5d normal = Matrix5d::Zero();
     Vector5d right = Vector5d::Zero();
     std::size_t explained = 0;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "common/median.h"
 #include "common/time.h"
 
 namespace livemap::recordings {
@@ -81,12 +82,6 @@ std::vector<FollowedCorner> Follow(const cv::Mat& from, const cv::Mat& to) {
   return followed;
 }
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// The rotation that explains how corners moved across their direction from the middle.
 Eigen::Vector3d RotationOf(const std::vector<FollowedCorner>& corners) {
   const auto count = static_cast<Eigen::Index>(corners.size());
@@ -109,7 +104,8 @@ Eigen::Vector3d RotationOf(const std::vector<FollowedCorner>& corners) {
     std::vector<double> sizes(static_cast<std::size_t>(count));
     Eigen::VectorXd::Map(sizes.data(), count) = residuals.cwiseAbs();
     // From nearly everything to what agrees.
-    const double scale = std::max(3e-4, 1.48 * MedianOf(std::move(sizes))) * (pass < 3 ? 6 : 3.5);
+    const double scale =
+        std::max(3e-4, kMedianToSigma * MedianOf(std::move(sizes))) * (pass < 3 ? 6 : 3.5);
     weights = (1 - (residuals / scale).array().square()).max(0).square();
   }
   return rotation;

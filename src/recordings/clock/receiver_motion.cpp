@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/median.h"
 #include "common/time.h"
 
 namespace livemap::recordings {
@@ -55,9 +56,7 @@ PlaneTrack InPlane(const RecordedTrack& track) {
 double MedianInterval(const std::vector<double>& times_s) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times_s.size(); ++i) intervals.push_back(times_s[i] - times_s[i - 1]);
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return TakeMedian(intervals);
 }
 
 struct SmoothMotion {

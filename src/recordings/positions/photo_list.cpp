@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/median.h"
 #include "common/time.h"
 #include "recordings/positions/position_fields.h"
 #include "recordings/time_text.h"
@@ -158,9 +159,7 @@ class PhotoReader {
       throw Error("the photo '" + first +
                   "' has a time without a zone: --time-zone says which, such as +02:00");
     }
-    const auto middle = ahead.begin() + static_cast<std::ptrdiff_t>(ahead.size() / 2);
-    std::nth_element(ahead.begin(), middle, ahead.end());
-    return std::llround(static_cast<double>(*middle) / static_cast<double>(kQuarterNs)) *
+    return std::llround(static_cast<double>(TakeMedian(ahead)) / static_cast<double>(kQuarterNs)) *
            kQuarterNs;
   }
 

@@ -4,7 +4,6 @@
 #include <rosbag/view.h>
 #include <sensor_msgs/CompressedImage.h>
 
-#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
@@ -19,6 +18,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/median.h"
 #include "imaging/report_picture.h"
 #include "perception/detection/hazard_detector.h"
 #include "perception/privacy/privacy_mask.h"
@@ -103,9 +103,7 @@ std::optional<Options> ParseEvaluatePrivacyOptions(int argc, char** argv) {
 
 double MedianPrivacyTime(std::vector<double> values) {
   if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
+  return TakeMedian(values);
 }
 
 /// How long `work` takes, ms.

@@ -18,6 +18,7 @@
 #include "change/registration/edge_registration.h"
 #include "change/registration/registration.h"
 #include "common/error.h"
+#include "common/median.h"
 #include "tools/common/command_line.h"
 #include "tools/common/progress.h"
 #include "tools/common/shipped_model.h"
@@ -133,9 +134,7 @@ double ChangeMillisecondsSince(std::chrono::steady_clock::time_point start) {
 
 std::optional<double> MedianChangeTime(std::vector<double> values) {
   if (values.empty()) return std::nullopt;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return TakeMedian(values);
 }
 
 /// Of the pixels that the truth does not leave out; 0 where it leaves all out.

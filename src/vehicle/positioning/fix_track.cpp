@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 
+#include "common/median.h"
 #include "common/time.h"
 #include "geo/fix_plausibility.h"
 
@@ -162,10 +163,8 @@ double FixTrack::ScatterM(const Points::const_iterator& end) const {
   if (scatters_m2.size() < kScattersEnough) {
     return std::max(config_.course_noise_m, FirstScatterM(end));
   }
-  const auto middle = scatters_m2.begin() + static_cast<std::ptrdiff_t>(scatters_m2.size() / 2);
-  std::nth_element(scatters_m2.begin(), middle, scatters_m2.end());
   // Half the square of two normal numbers has this median.
-  return std::max(config_.course_noise_m, std::sqrt(*middle / M_LN2));
+  return std::max(config_.course_noise_m, std::sqrt(TakeMedian(scatters_m2) / M_LN2));
 }
 
 /// What the last fix before `end` states; 0 where fixes come too seldom to show more.
