@@ -18,8 +18,10 @@ constexpr double kMaxPredictionS = 0.5;
 constexpr double kMinCondition = 1e-12;
 /// What a search finds must explain this much more to be preferred to what was there.
 constexpr double kBetterScore = 0.03;
-/// Of the newest frame in the mean of the agreements.
-constexpr double kAgreementShare = 0.2;
+/// Movements that nothing shows go on for so long, s: the camera may have stopped.
+constexpr double kUnseenMotionS = 0.5;
+/// A share of the surfaces with which a motion is no chance, though little of the keyframe is left.
+constexpr double kSureSurfaces = 0.95;
 
 /// The covariance of what a matrix makes of a vector with this one. Its variances are sums of
 /// squares: no rounding makes them negative.
@@ -142,9 +144,13 @@ bool EdgeOdometry::AddKeyframe(const cv::Mat& depth_m, const cv::Mat& inverse_de
 
 void EdgeOdometry::Correct(const Eigen::Isometry3d& said_from_true, double since_s) {
   last_.world_from_camera = last_.world_from_camera * said_from_true;
-  if (last_.twist) *last_.twist += Se3Log(said_from_true) / since_s;
-  ForgetCourses();
-  if (last_.twist) course_ = Course{last_.world_from_camera, *last_.twist};
+  const Vector6d change = Se3Log(said_from_true) / since_s;
+  if (last_.twist) *last_.twist += change;
+  for (std::optional<Course>* course : {&course_, &rival_course_}) {
+    if (!*course) continue;
+    (*course)->world_from_camera = (*course)->world_from_camera * said_from_true;
+    (*course)->twist += change;
+  }
 }
 
 bool EdgeOdometry::AddEarlierKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_depth_sigma,
@@ -299,15 +305,24 @@ void EdgeOdometry::Judge(Attempt& attempt) const {
 
 /// Whether what a search found explains clearly more than what was followed, of the edges and of
 /// the surfaces; both of one keyframe.
-bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) const {
-  const SurfaceConstraint surfaces = SurfacesOf(*followed.keyframe);
+bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) {
+  Keyframe& keyframe = *followed.keyframe;
+  const SurfaceConstraint surfaces = SurfacesOf(keyframe);
   const double bound =
       SurfaceBound(std::min(found.fine.surface_sigma, followed.fine.surface_sigma));
   const auto here = surfaces.Agreement(found.fine.state.new_from_reference, bound);
   const auto there = surfaces.Agreement(followed.fine.state.new_from_reference, bound);
   const bool both = here && there;
-  return ExplainedScore(found.fine) * (both ? *here : 1) >
-         ExplainedScore(followed.fine) * (both ? *there : 1) + kBetterScore;
+  const int level = keyframe.finest_level;
+  const EdgePoints& points = PointsOf(keyframe, level);
+  const auto score = [&](AlignmentResult result) {
+    result.explained = aligner_.ExplainedAt(points, frame_images_[level],
+                                            cameras_.camera[static_cast<std::size_t>(level)],
+                                            result.state, found.noise);
+    return ExplainedScore(result);
+  };
+  return score(found.fine) * (both ? *here : 1) >
+         score(followed.fine) * (both ? *there : 1) + kBetterScore;
 }
 
 /// How far the keyframe's points move over the image between a motion and an attempt's, px.
@@ -319,7 +334,7 @@ double EdgeOdometry::PixelsFrom(const Eigen::Isometry3d& new_from_reference,
 
 /// Who is believed. One of two motions that a search cannot tell apart is not told apart from what
 /// was followed either.
-EdgeOdometry::Attempt EdgeOdometry::Better(const Attempt& found, const Attempt& followed) const {
+EdgeOdometry::Attempt EdgeOdometry::Better(const Attempt& found, const Attempt& followed) {
   if (!found.good) return followed;
   if (!followed.good || IsBetter(found, followed)) return found;
   if (!found.ambiguous) return followed;
@@ -364,7 +379,7 @@ EdgeOdometry::Attempt EdgeOdometry::Follow(std::int64_t stamp_ns) {
 }
 
 /// Of two motions that explain as much, the one that is as expected is believed when the other is
-/// twice as far from that. Only a motion that was told apart itself tells others apart.
+/// twice as far from that. They are told apart then, if the last motion was.
 void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.ambiguous) return;
   const Eigen::Isometry3d expected =
@@ -409,7 +424,7 @@ bool EdgeOdometry::IsDisplaced(const Attempt& attempt) const {
 
 /// Whether a place that was looked for without any prior looks as places did before.
 bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
-  return attempt.good &&
+  return attempt.good && attempt.fine.Overlap() >= config_.min_overlap &&
          attempt.fine.Agreement() >=
              agreement_.value() - std::max(config_.found_drop, UsualDrop()) &&
          attempt.surfaces.value_or(1) >=
@@ -448,9 +463,20 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
   attempt.fine = outcome.best;
   attempt.ambiguous = outcome.ambiguous;
   attempt.rival = outcome.rival;
+  attempt.noise = outcome.noise;
   attempt.iterations = outcome.iterations;
   Judge(attempt);
   return attempt;
+}
+
+void EdgeOdometry::ProposeByFeatures(Keyframe& keyframe, MotionProposals& proposals) {
+  if (!frame_features_.found) FindFeatures(frame_images_[0], frame_features_);
+  if (!keyframe.features.found) FindFeatures(keyframe.images[0], keyframe.features);
+  const auto motion = NewFromReferenceByFeatures(keyframe.features, keyframe.depths[0],
+                                                 frame_features_, cameras_.camera[0]);
+  if (!motion) return;
+  proposals.Add(*motion);
+  WideSearch::ProposeAround(*motion, proposals);
 }
 
 /// Searches among the guesses and what thumbnails say; where that is not convincing, around what
@@ -465,22 +491,15 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);
   const double enough = std::max(config_.feature_agreement, agreement_.value() - UsualDrop());
-  if (first.good && settled_ && course_ && !first.ambiguous && first.fine.Agreement() >= enough &&
-      !IsDisplaced(first)) {
-    return first;
-  }
+  const bool is_convincing =
+      first.good && !first.ambiguous && first.fine.Agreement() >= enough && !IsDisplaced(first);
+  // Where nothing says how the camera moved before, the true motion may not be among these.
+  if (is_convincing && settled_ && course_) return first;
   proposals = {};
   proposals.Add(first.fine.state.new_from_reference);
   if (first.ambiguous) proposals.Add(first.rival.state.new_from_reference);
   WideSearch::ProposeAround(first.fine.state.new_from_reference, proposals);
-  if (!frame_features_.found) FindFeatures(frame_images_[0], frame_features_);
-  if (!keyframe.features.found) FindFeatures(keyframe.images[0], keyframe.features);
-  const auto motion = NewFromReferenceByFeatures(keyframe.features, keyframe.depths[0],
-                                                 frame_features_, cameras_.camera[0]);
-  if (motion) {
-    proposals.Add(*motion);
-    WideSearch::ProposeAround(*motion, proposals);
-  }
+  if (!is_convincing) ProposeByFeatures(keyframe, proposals);
   WideSearch::ProposeMoves(first.fine.state.new_from_reference,
                            1 / keyframe.finest_points().mean_inverse_depth, proposals);
   WideSearch::ProposeFan(*guesses.begin(), proposals);
@@ -530,7 +549,7 @@ bool EdgeOdometry::IsGood(const Attempt& attempt) const {
   const AlignmentResult& result = attempt.fine;
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
-  const bool is_measured = attempt.surfaces.value_or(0) >= kSurfacesAtFirst;
+  const bool is_measured = attempt.surfaces.value_or(0) >= kSureSurfaces;
   return std::isfinite(result.cost) &&
          IsBelievableMove(result.state.new_from_reference,
                           attempt.keyframe->finest_points().mean_inverse_depth) &&
@@ -593,8 +612,10 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   ambiguous_frames_ = attempt.ambiguous ? ambiguous_frames_ + 1 : 0;
   settled_ = ambiguous_frames_ == 0 || ambiguous_frames_ > config_.max_ambiguous_frames;
-  agreement_.Add(fine.Agreement());
-  if (attempt.surfaces) surfaces_.Add(*attempt.surfaces);
+  if (settled_) {  // What is doubted is not usual.
+    agreement_.Add(fine.Agreement());
+    if (attempt.surfaces) surfaces_.Add(*attempt.surfaces);
+  }
   ForgetCourses();
   if (last_.state == VoState::kTracking) {
     const auto course_to = [&](const Eigen::Isometry3d& world_from_camera) {
@@ -623,15 +644,21 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   return result;
 }
 
-/// The pose of an attempt. What nothing shows of it goes on as it was, or stays where it was if
-/// that is not known, instead of wherever noise brought it.
+/// The pose of an attempt. What nothing shows of it goes on as it was for a while, instead of
+/// wherever noise brought it.
 Eigen::Isometry3d EdgeOdometry::Continued(const Attempt& attempt, std::int64_t stamp_ns) const {
   const AlignmentResult& fine = attempt.fine;
   const Eigen::Isometry3d said =
       attempt.keyframe->world_from_camera * fine.state.new_from_reference.inverse();
+  // The errors of depths that are estimates are larger than all that noise does.
+  if (!(attempt.keyframe->finest_points().gradient_noise > 0)) return said;
+  const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
+  const Eigen::Isometry3d expected =
+      course_ ? course_->After(step_s * std::exp(-step_s / kUnseenMotionS))
+              : last_.world_from_camera;
   const Matrix6d covariance =
       Transformed(Se3Adjoint(fine.state.new_from_reference), fine.covariance);
-  return said * Se3Exp(UnseenPart(Se3Log(said.inverse() * Expected(stamp_ns)), covariance));
+  return said * Se3Exp(UnseenPart(Se3Log(said.inverse() * expected), covariance));
 }
 
 /// What no edge shows is not further away than a camera may move in that time.
@@ -649,6 +676,8 @@ VoResult EdgeOdometry::Hold(std::int64_t stamp_ns) {
   VoResult result = last_;
   result.state = VoState::kLost;
   ForgetCourses();
+  settled_ = false;
+  ambiguous_frames_ = 0;
   result.twist.reset();
   result.twist_covariance.setZero();
   result.new_keyframe = false;

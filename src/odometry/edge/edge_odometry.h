@@ -194,6 +194,7 @@ class EdgeOdometry {
     Keyframe* keyframe = nullptr;
     AlignmentResult fine;
     int iterations = 0;
+    double noise = kNoiseGrey;       ///< See WideSearch::Outcome.
     std::optional<double> surfaces;  ///< See VoResult.
     bool good = false;
     bool ambiguous = false;
@@ -217,14 +218,15 @@ class EdgeOdometry {
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
   Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
+  void ProposeByFeatures(Keyframe& keyframe, MotionProposals& proposals);
   void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;
   void CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const;
   Attempt FindBack();
   MeasuredDepth Depth() const;
   SurfaceConstraint SurfacesOf(const Keyframe& keyframe) const;
   void Judge(Attempt& attempt) const;
-  bool IsBetter(const Attempt& found, const Attempt& followed) const;
-  Attempt Better(const Attempt& found, const Attempt& followed) const;
+  bool IsBetter(const Attempt& found, const Attempt& followed);
+  Attempt Better(const Attempt& found, const Attempt& followed);
   double PixelsFrom(const Eigen::Isometry3d& new_from_reference, const Attempt& attempt) const;
   bool IsGood(const Attempt& attempt) const;
   bool WantsKeyframe(const AlignmentResult& result, const Eigen::Isometry3d& world_from_camera);
@@ -255,8 +257,9 @@ class EdgeOdometry {
   int frames_since_keyframe_ = 0;
   std::size_t searched_keyframes_ = 0;  // By a camera that is lost.
   int ambiguous_frames_ = 0;            // In a row.
-  bool settled_ = false;                // Whether the last motion was told apart from all others.
-  UsualShare agreement_;                // Of the edges,
+  // Whether the last motion was told apart from all others, or could not be in several frames.
+  bool settled_ = false;
+  UsualShare agreement_;                   // Of the edges,
   UsualShare surfaces_{kSurfacesAtFirst};  // and of the surfaces.
   AlignmentState light_;                   // Gain and bias of the last frame.
 

@@ -59,11 +59,16 @@ Matrix6d SeenMovements::Widened(const Matrix6d& covariance) const {
   const Vector6d seen = IsSeen();
   const Matrix6d widening = twist_from_coordinates_ * seen.asDiagonal() * coordinates_from_twist_;
   Matrix6d widened = widening * covariance * widening.transpose();
+  // The directions may be all but parallel; all that they span is unseen.
+  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6> unseen(6, 6);
+  Eigen::Index count = 0;
   for (int i = 0; i < 6; ++i) {
-    if (seen[i] > 0) continue;
-    const Vector6d direction = twist_from_coordinates_.col(i).normalized();
-    widened += kUnseenVariance * direction * direction.transpose();
+    if (seen[i] == 0) unseen.col(count++) = twist_from_coordinates_.col(i).normalized();
   }
+  if (count == 0) return widened;
+  unseen.conservativeResize(6, count);
+  const Matrix6d rotation = unseen.householderQr().householderQ();
+  widened += kUnseenVariance * rotation.leftCols(count) * rotation.leftCols(count).transpose();
   return widened;
 }
 

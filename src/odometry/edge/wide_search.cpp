@@ -172,6 +172,7 @@ void WideSearch::AskNoise(const EdgePoints& points, const cv::Mat& grey,
   }
   const double noise = kNoiseSigmas * std::sqrt(least_cost);
   if (!(noise < kNoiseGrey)) return;
+  noise_ = noise;
   for (std::size_t i = 0; i < count_; ++i) {
     Candidate& candidate = candidates_[i];
     if (candidate.score == 0) continue;
@@ -198,6 +199,7 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
                                        const Reference& reference) {
   Outcome outcome;
   count_ = 0;
+  noise_ = kNoiseGrey;
   for (const Eigen::Isometry3d& motion : proposals) {
     candidates_[count_] = {};
     candidates_[count_++].result.state.new_from_reference = motion;
@@ -211,6 +213,7 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
     mean_inverse_depth = points.mean_inverse_depth;
   }
   outcome.best = candidates_[0].result;
+  outcome.noise = noise_;
   for (std::size_t i = 1; i < count_ && !outcome.ambiguous; ++i) {
     outcome.rival = candidates_[i].result;
     outcome.ambiguous =

@@ -46,6 +46,8 @@ class WideSearch {
     /// Another motion explains nearly as much: the picture repeats itself.
     bool ambiguous = false;
     AlignmentResult rival;  ///< That motion.
+    /// Up to so many grey levels a residual was noise, see ExplainedAt of Aligner.
+    double noise = kNoiseGrey;
     int iterations = 0;
   };
   /// What is aligned with the images.
@@ -82,7 +84,6 @@ class WideSearch {
 
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
                  const Reference& reference);
-  void AskSurfaces(const SurfaceConstraint& surfaces, double bound);
 
  private:
   struct Candidate {
@@ -90,6 +91,7 @@ class WideSearch {
     double score = 0;
   };
 
+  void AskSurfaces(const SurfaceConstraint& surfaces, double bound);
   void AskNoise(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera);
   void Refine(const EdgePoints& points, const cv::Mat& grey, int level, const Reference& reference);
 
@@ -98,6 +100,7 @@ class WideSearch {
   ShiftSearch shifts_;
   std::array<Candidate, MotionProposals::kMost> candidates_;
   std::size_t count_ = 0;
+  double noise_ = kNoiseGrey;  // Of this search.
 };
 
 /// Share of the points that an alignment explains; those out of view count in part, so that looking

@@ -42,6 +42,17 @@ TEST(SeenMovements, AnUnseenMovementMayLieAcrossTheAxes) {
   EXPECT_NEAR(told[1], -0.5, 0.01);
 }
 
+TEST(SeenMovements, TwoUnseenMovementsThatAreAllButParallelAreBothUnseen) {
+  // Down and a turn up bring the points of a wall to nearly the same places.
+  Matrix6d information = Diagonal(100, 1, 100, 1, 100, 100);
+  information(1, 3) = information(3, 1) = 0.9999;
+  const SeenMovements seen(information, information - Diagonal(99, 0, 99, 0, 99, 99));
+  const Matrix6d widened = seen.Widened(1e-4 * Matrix6d::Identity());
+  EXPECT_NEAR(widened(1, 1), kUnseenVariance, 1e-2);
+  EXPECT_NEAR(widened(3, 3), kUnseenVariance, 1e-2);
+  EXPECT_NEAR(widened(0, 0), 1e-4, 1e-9);
+}
+
 TEST(SeenMovements, InformationThatTellsNothingChangesNothing) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Matrix6d& information :
