@@ -19,7 +19,7 @@ constexpr double kMinCondition = 1e-12;
 /// What a search finds must explain this much more to be preferred to what was there.
 constexpr double kBetterScore = 0.03;
 /// Movements that nothing shows go on for so long, s: the camera may have stopped.
-constexpr double kUnseenMotionS = 0.5;
+constexpr double kUnseenMotionS = 2;
 /// A share of the surfaces with which a motion is no chance, though little of the keyframe is left.
 constexpr double kSureSurfaces = 0.95;
 

@@ -381,19 +381,18 @@ TEST(EdgeOdometry, StripesDoNotMoveTheCameraAlongThem) {
 }
 
 TEST(EdgeOdometry, WhatStripesDoNotShowGoesOnAsItWas) {
-  // At the left the stripes have a pattern; the camera sinks while it goes to the right.
+  // At the left the stripes, which lean, have a pattern; the camera sinks while it goes to the
+  // right.
   EdgeOdometry odometry({}, {525, 525, 319.5, 239.5, 640, 480});
   cv::RNG random(3);
   const auto is_light = [](double x, double y) {
-    return IsOdd(x) != (x < 0 && IsOdd(y) != IsOdd(0.6 * y));
+    return IsOdd(x + 0.01 * y) != (x < 0 && IsOdd(y) != IsOdd(0.6 * y));
   };
   for (int i = 0; i < 30; ++i) {
-    RgbdFrame wall = SeeWall(i, 0.07 * i, 0.02 * i, random, is_light);
-    cv::GaussianBlur(wall.grey, wall.grey, {5, 5}, 0);
-    const VoResult result = odometry.Track(wall);
+    const VoResult result = odometry.Track(SeeWall(i, 0.07 * i, 0.02 * i, random, is_light));
     ASSERT_EQ(result.state, VoState::kTracking) << i;
     EXPECT_NEAR(result.world_from_camera.translation().x(), 0.07 * i, 0.02) << i;
-    EXPECT_NEAR(result.world_from_camera.translation().y(), 0.02 * i, 0.006) << i;
+    EXPECT_NEAR(result.world_from_camera.translation().y(), 0.02 * i, 0.05) << i;
   }
 }
 
