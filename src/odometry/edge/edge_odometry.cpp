@@ -479,8 +479,8 @@ void EdgeOdometry::ProposeByFeatures(Keyframe& keyframe, MotionProposals& propos
   WideSearch::ProposeAround(*motion, proposals);
 }
 
-/// Searches among the guesses and what thumbnails say; where that is not convincing, around what
-/// was found and among what features say.
+/// Searches among the guesses and what thumbnails say; where that is not enough, around what was
+/// found, and among what features say if it is not convincing.
 EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses& guesses) {
   MotionProposals proposals;
   for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);

@@ -195,8 +195,7 @@ double TwoViewStart::MedianParallaxPx() const {
       const Eigen::Vector3d now = RayOfCorner(end_[i], camera_);
       left[i] = camera_.fx * (seen.hnormalized() - now.hnormalized()).norm();
     }
-    std::vector<double> ways = left;
-    limit_px = TakeMedian(ways);
+    limit_px = MedianOf(left);
   }
   return limit_px;
 }
