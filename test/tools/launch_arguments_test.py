@@ -7,6 +7,8 @@ import unittest
 from xml.etree import ElementTree
 
 import yaml
+from roslaunch.config import ROSLaunchConfig
+from roslaunch.xmlloader import XmlLoader
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BAG = ROOT / "rosbags/town.bag"
@@ -21,17 +23,33 @@ NODES = {
 }
 
 
+def configured(launch, *arguments):
+    """What roslaunch would start, read in this process: its own takes seconds to begin."""
+    configuration = ROSLaunchConfig()
+    XmlLoader().load(str(ROOT / "launch" / launch), configuration, argv=list(arguments), verbose=False)
+    return configuration
+
+
 def parameters(launch, *arguments):
     """What roslaunch would put on the parameter server."""
-    result = subprocess.run(["/usr/bin/roslaunch", "--dump-params", str(ROOT / "launch" / launch), *arguments],
-                            check=True, capture_output=True, text=True)
-    return yaml.safe_load(result.stdout)
+    return {str(name): parameter.value for name, parameter in configured(launch, *arguments).params.items()}
 
 
 def nodes(launch, *arguments):
-    """What roslaunch says about the nodes that it would start."""
+    """Full names of what roslaunch would start."""
+    return [f"{node.namespace}{node.name}" for node in configured(launch, *arguments).nodes]
+
+
+def remapped(launch, node, *arguments):
+    """Of a node's topics: by its own name, by the one outside."""
+    wanted = [each for each in configured(launch, *arguments).nodes if each.name == node]
+    return dict(wanted[0].remap_args)
+
+
+def refused(launch, *arguments):
+    """Exit status and error output of roslaunch."""
     return subprocess.run(["/usr/bin/roslaunch", "--nodes", str(ROOT / "launch" / launch), *arguments],
-                          capture_output=True, text=True)
+                          capture_output=True, text=True, check=False)
 
 
 def changed(value):
@@ -44,6 +62,11 @@ def changed(value):
 
 
 class LaunchArguments(unittest.TestCase):
+    def assert_refused(self, why, launch, *arguments):
+        ended = refused(launch, *arguments)
+        self.assertNotEqual(ended.returncode, 0)
+        self.assertIn(why, ended.stderr)
+
     def test_every_parameter_of_every_node_can_be_set_by_the_argument_of_its_node(self):
         """Also those that another argument sets: what was said of the node itself holds."""
         for launch, nodes in NODES.items():
@@ -79,36 +102,32 @@ class LaunchArguments(unittest.TestCase):
         self.assertEqual(parameters("zone.launch", f"tile_attribution:={credit}")["/zone_cloudlet/tile_attribution"], credit)
 
     def test_a_small_vehicle_discards_early_and_has_no_detector(self):
-        big, small = nodes("vehicle.launch").stdout, nodes("vehicle.launch", "profile:=small").stdout
+        big, small = nodes("vehicle.launch"), nodes("vehicle.launch", "profile:=small")
         self.assertIn("/hazard_detection", big)
         self.assertNotIn("/early_discard", big)
         self.assertNotIn("/hazard_detection", small)
         self.assertIn("/early_discard", small)
         self.assertIn("/hazard_reporting", small)
-        refused = nodes("vehicle.launch", "profile:=tiny")
-        self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("profile:=tiny is neither big nor small", refused.stderr)
+        self.assert_refused("profile:=tiny is neither big nor small", "vehicle.launch", "profile:=tiny")
 
     def test_a_vehicle_reads_a_receiver_of_its_own_only_when_told_to(self):
-        self.assertNotIn("/gps_receiver", nodes("vehicle.launch").stdout)
-        self.assertIn("/gps_receiver", nodes("vehicle.launch", "receiver:=gpsd").stdout)
+        self.assertNotIn("/gps_receiver", nodes("vehicle.launch"))
+        self.assertIn("/gps_receiver", nodes("vehicle.launch", "receiver:=gpsd"))
         dumped = parameters("vehicle.launch", "receiver:=gpsd", "localize:=true", "gps_receiver:={device: /dev/ttyACM0}")
         self.assertEqual(dumped["/gps_receiver/device"], "/dev/ttyACM0")
         self.assertEqual(dumped["/geo_localization/latency_s"], 0.0, "it stamps the measurement")
-        refused = nodes("vehicle.launch", "receiver:=serial")
-        self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("receiver:=serial is neither none nor gpsd", refused.stderr)
+        self.assert_refused("receiver:=serial is neither none nor gpsd", "vehicle.launch", "receiver:=serial")
 
     def test_a_vehicle_detects_changes_only_when_told_to(self):
-        self.assertNotIn("/change_detection", nodes("vehicle.launch").stdout)
-        self.assertIn("/change_detection", nodes("vehicle.launch", "changes:=true").stdout)
+        self.assertNotIn("/change_detection", nodes("vehicle.launch"))
+        self.assertIn("/change_detection", nodes("vehicle.launch", "changes:=true"))
         dumped = parameters("vehicle.launch", "changes:=true", "directory:=/var/car", "drive:=monday")
         self.assertEqual(dumped["/change_detection/directory"], "/var/car/places")
         self.assertEqual(dumped["/change_detection/drive_id"], "monday")
 
     def test_a_zone_detects_for_small_vehicles_unless_told_not_to(self):
-        self.assertIn("/candidate_intake", nodes("zone.launch").stdout)
-        without = nodes("zone.launch", "detect_for_small:=false").stdout
+        self.assertIn("/candidate_intake", nodes("zone.launch"))
+        without = nodes("zone.launch", "detect_for_small:=false")
         self.assertNotIn("/candidate_intake", without)
         self.assertNotIn("/hazard_detection", without)
 
@@ -122,10 +141,8 @@ class LaunchArguments(unittest.TestCase):
         wanted = {(): "camera/depth/image_raw", ("stereo:=true",): "camera_rect/depth/image_raw",
                   ("stereo:=true", "depth:=own/depth"): "own/depth"}
         for arguments, topic in wanted.items():
-            command = subprocess.run(["/usr/bin/roslaunch", "--args", "/edge_vo",
-                                      str(ROOT / "launch" / "vehicle.launch"), "vo:=true", *arguments],
-                                     check=True, capture_output=True, text=True).stdout
-            self.assertIn(f" camera/depth/image_raw:={topic} ", command)
+            remaps = remapped("vehicle.launch", "edge_vo", "vo:=true", *arguments)
+            self.assertEqual(remaps["camera/depth/image_raw"], topic)
 
     def test_odometry_runs_with_the_eyes_there_are_unless_told_otherwise(self):
         """By default with one eye or more; by depth alone where that is asked for; not at all on a small vehicle."""
@@ -141,17 +158,13 @@ class LaunchArguments(unittest.TestCase):
                 self.assertIs(dumped["/hazard_reporting/publish_tf"], not runs)
                 self.assertIs(dumped["/hazard_reporting/use_depth"], "vo:=true" in arguments)
         self.assertIs(parameters("vehicle.launch", "stereo:=true")["/hazard_reporting/use_depth"], True)
-        refused = nodes("vehicle.launch", "vo:=both")
-        self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("vo:=both is neither auto, true nor false", refused.stderr)
+        self.assert_refused("vo:=both is neither auto, true nor false", "vehicle.launch", "vo:=both")
 
     def test_positions_by_fusion_are_refused_without_it_and_told_what_they_need(self):
-        refused = nodes("vehicle.launch", "vo:=false", "position_source:=fused")
-        self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("position_source:=fused needs localize:=true", refused.stderr)
+        self.assert_refused("position_source:=fused needs localize:=true", "vehicle.launch", "vo:=false",
+                            "position_source:=fused")
         for arguments in ((), ("vo:=true",), ("vo:=false", "localize:=true"), ("vo:=true", "position_source:=gps")):
-            accepted = nodes("vehicle.launch", *arguments)
-            self.assertEqual(accepted.returncode, 0, accepted.stderr)
+            self.assertIn("/hazard_reporting", nodes("vehicle.launch", *arguments))
 
     def test_a_nodelet_that_does_not_load_is_tried_again_only_after_a_pause(self):
         for launch in ("vehicle.launch", "zone.launch"):
@@ -165,16 +178,11 @@ class LaunchArguments(unittest.TestCase):
         wanted = {(): True, ("use_truth:=true",): False, ("detect:=false",): False,
                   ("use_truth:=true", "detect:=true"): True}
         for arguments, runs in wanted.items():
-            started = nodes("replay.launch", f"bag:={BAG}", *arguments)
-            self.assertEqual(started.returncode, 0, started.stderr)
-            self.assertEqual("/hazard_detection" in started.stdout.split(), runs, arguments)
+            self.assertEqual("/hazard_detection" in nodes("replay.launch", f"bag:={BAG}", *arguments), runs, arguments)
 
     def test_the_tf_of_a_bag_goes_where_it_is_wanted(self):
         for arguments, topic in (((), "tf"), (("bag_tf:=ground_truth/tf",), "ground_truth/tf")):
-            command = subprocess.run(["/usr/bin/roslaunch", "--args", "/player",
-                                      str(ROOT / "launch" / "replay.launch"), f"bag:={BAG}", *arguments],
-                                     check=True, capture_output=True, text=True).stdout
-            self.assertIn(f" tf:={topic} ", command)
+            self.assertEqual(remapped("replay.launch", "player", f"bag:={BAG}", *arguments)["tf"], topic)
 
     def test_a_replay_hands_its_arguments_on_to_the_vehicle(self):
         dumped = parameters("replay.launch", f"bag:={BAG}", "vehicle:=car-7", "hazard_reporting:={max_range_m: 12.5}")
