@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "nodes/word_program.h"
 #include "zone/labels/label_export.h"
 #include "zone/store/postgresql_url.h"
 
@@ -79,19 +80,11 @@ void Tell(const livemap::zone::LabelExport& done, const std::string& out) {
 
 int main(int argc, char** argv) {
   using namespace livemap::nodes;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (const std::string& word : words) {
-    if (word != "--help" && word != "-h") continue;
-    std::cout << kExportHelp;
-    return 0;
-  }
-  try {
-    const ExportArguments arguments = ParseExport(words);
-    Tell(livemap::zone::ExportLabels(arguments.directory, arguments.out, arguments.store_url),
-         arguments.out);
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "livemap zone export-labels: " << error.what() << '\n';
-    return 2;
-  }
+  return RunWordProgram(
+      "livemap zone export-labels", kExportHelp, argc, argv,
+      [](const std::vector<std::string>& words) {
+        const ExportArguments arguments = ParseExport(words);
+        Tell(livemap::zone::ExportLabels(arguments.directory, arguments.out, arguments.store_url),
+             arguments.out);
+      });
 }

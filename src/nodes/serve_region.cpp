@@ -17,6 +17,7 @@
 #include "common/mutex.h"
 #include "common/utc_text.h"
 #include "directory/directory_file.h"
+#include "nodes/word_program.h"
 #include "protocol/hazard_catalogue.h"
 #include "region/region.h"
 #include "region/region_server.h"
@@ -249,17 +250,7 @@ void Serve(RegionArguments arguments) {
 
 int main(int argc, char** argv) {
   using namespace livemap::nodes;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (const std::string& word : words) {
-    if (word != "--help" && word != "-h") continue;
-    std::cout << kRegionHelp;
-    return 0;
-  }
-  try {
-    Serve(ParseRegionArguments(words));
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "livemap region: " << error.what() << '\n';
-    return 2;
-  }
+  return RunWordProgram(
+      "livemap region", kRegionHelp, argc, argv,
+      [](const std::vector<std::string>& words) { Serve(ParseRegionArguments(words)); });
 }

@@ -16,6 +16,7 @@
 #include "common/utc_text.h"
 #include "directory/directory_keeper.h"
 #include "directory/signed_document.h"
+#include "nodes/word_program.h"
 
 namespace livemap::nodes {
 namespace {
@@ -156,18 +157,9 @@ void Show(const DirectoryArguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace livemap::nodes;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (const std::string& word : words) {
-    if (word != "--help" && word != "-h") continue;
-    std::cout << kDirectoryHelp;
-    return 0;
-  }
-  try {
-    const DirectoryArguments arguments = ParseDirectoryArguments(words);
-    arguments.command == "check" ? Check(arguments) : Show(arguments);
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "livemap zone directory: " << error.what() << '\n';
-    return 2;
-  }
+  return RunWordProgram("livemap zone directory", kDirectoryHelp, argc, argv,
+                        [](const std::vector<std::string>& words) {
+                          const DirectoryArguments arguments = ParseDirectoryArguments(words);
+                          arguments.command == "check" ? Check(arguments) : Show(arguments);
+                        });
 }

@@ -14,6 +14,7 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/sqlite.h"
+#include "nodes/word_program.h"
 #include "zone/pictures/owned_directory.h"
 #include "zone/service/erasure_desk.h"
 #include "zone/service/zone_service.h"
@@ -180,17 +181,6 @@ void Run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace livemap::nodes;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (const std::string& word : words) {
-    if (word != "--help" && word != "-h") continue;
-    std::cout << kHelp;
-    return 0;
-  }
-  try {
-    Run(Parse(words));
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "livemap zone forget: " << error.what() << '\n';
-    return 2;
-  }
+  return RunWordProgram("livemap zone forget", kHelp, argc, argv,
+                        [](const std::vector<std::string>& words) { Run(Parse(words)); });
 }

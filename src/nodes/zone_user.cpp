@@ -15,6 +15,7 @@
 #include "common/clock.h"
 #include "common/error.h"
 #include "common/utc_text.h"
+#include "nodes/word_program.h"
 
 namespace livemap::nodes {
 namespace {
@@ -199,17 +200,6 @@ void Run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace livemap::nodes;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (const std::string& word : words) {
-    if (word != "--help" && word != "-h") continue;
-    std::cout << kHelp;
-    return 0;
-  }
-  try {
-    Run(Parse(words));
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "livemap zone user: " << error.what() << '\n';
-    return 2;
-  }
+  return RunWordProgram("livemap zone user", kHelp, argc, argv,
+                        [](const std::vector<std::string>& words) { Run(Parse(words)); });
 }
