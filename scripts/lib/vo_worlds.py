@@ -1,4 +1,4 @@
-"""The table of generated rooms that livemap bench vo --worlds prints."""
+"""The tables that livemap bench vo --worlds prints."""
 
 import statistics
 
@@ -49,3 +49,16 @@ def table(rows):
                  f"{cell(summary['nees_translation_median'], 2)} (translation), "
                  f"{cell(summary['nees_rotation_median'], 2)} (rotation).\n")
     return text
+
+
+def box_table(rows):
+    """Markdown: a row for each kind of walk through rooms of boxes."""
+    lines = ["| rooms | seeds | n | median ATE (m) | worst (m) | lost | false | NEES t: median, rooms above 2 | ms |",
+             "|" + "---|" * 9]
+    for row in rows:
+        seeds = f"{row['first_seed']}, {row['first_seed'] + 2}, ... {row['each'][-1]['seed']}"
+        lines.append(f"| {row['trial']} | {seeds} | {row['rooms']} | {cell(row['median_ate_m'], 5)} "
+                     f"| {cell(row['worst_ate_m'], 4)} | {row['lost']} of {row['frames']} | {row['false_rooms']} "
+                     f"| {cell(row['median_nees_translation'], 2)}, {row['rooms_above_nees_2']} "
+                     f"| {cell(row['median_ms'], 2)} |")
+    return "\n".join(lines) + "\n"

@@ -180,6 +180,22 @@ class BenchVoTest(unittest.TestCase):
         done = run(MEASURE, "tables", self.own, "--edge-model", "/nowhere")
         self.assertEqual(done.returncode, 2)
 
+    def test_rooms_of_boxes_are_followed_and_told_in_a_table(self):
+        done = run(SCRIPT, "--quick", "--worlds", "boxes", "--cache", self.cache, "--programs", PROGRAMS)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = [line for line in done.stdout.splitlines() if line.startswith("|")][2:]
+        self.assertEqual([row.split("|")[1].strip() for row in rows],
+                         ["speed 1", "speed 4", "every 4th frame", "depth with noise", "speed 4 at 10 Hz"])
+        results = json.loads((self.cache / "worlds_boxes.json").read_text(encoding="utf-8"))
+        for row in results["rows"]:
+            self.assertEqual([room["seed"] for room in row["each"]], [row["first_seed"], row["first_seed"] + 2])
+            self.assertEqual(row["frames"], 2 * 4)
+            for room in row["each"]:
+                self.assertEqual(room["false"], room["lost"] > 0 or room["worst_step_m"] > 0.02)
+        slow = results["rows"][0]["each"]
+        self.assertLess(min(room["ate_rmse_m"] for room in slow), 0.003)
+        self.assertGreater(min(room["ate_rmse_m"] for room in slow), 0, "noise is drawn")
+
     def test_help_names_every_flag(self):
         done = run(SCRIPT, "--help")
         self.assertEqual(done.returncode, 0)
