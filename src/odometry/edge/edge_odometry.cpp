@@ -16,8 +16,18 @@ namespace {
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
 constexpr double kMinCondition = 1e-12;
+/// Weight of the newest frame in what is usual.
+constexpr double kNewestNoise = 0.2;
+/// So many more searches follow one whose outcome looks unlike the keyframe.
+constexpr int kPeriodSearches = 2;
+/// Of what is usual, so much of the picture looks the same where a camera finds back.
+constexpr double kFoundPicture = 0.6;
+/// A share of the picture that is convincing before anything is usual.
+constexpr double kConvincingPicture = 0.8;
 /// What a search finds must explain this much more to be preferred to what was there.
 constexpr double kBetterScore = 0.03;
+/// Where edges and surfaces explain this much more or less, the picture is not asked.
+constexpr double kTold = 0.1;
 /// Movements that nothing shows go on for so long, s: the camera may have stopped.
 constexpr double kUnseenMotionS = 2;
 /// A share of the surfaces with which a motion is no chance, though little of the keyframe is left.
@@ -79,6 +89,8 @@ void EdgeOdometry::Reset() {
 void EdgeOdometry::ForgetUsual() {
   agreement_.Forget();
   surfaces_.Forget();
+  picture_.Forget();
+  picture_noise_.reset();
 }
 
 void EdgeOdometry::ForgetCourses() {
@@ -172,6 +184,7 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
   fresh->covariance = result.covariance;
   fresh->depths.Build(frame.depth, frame.depth_units_per_m, config_.depth_range, cameras_.levels);
   fresh->inverse_depth_sigmas.Clear();
+  fresh->picture.Clear();
   fresh->features.Clear();
   fresh->surfaces.Clear();
   if (!inverse_depth_sigma.empty()) {
@@ -186,6 +199,11 @@ bool EdgeOdometry::MakeKeyframe(const RgbdFrame& frame, const cv::Mat& inverse_d
                          cameras_.camera[static_cast<std::size_t>(coarsest)]);
   }
   std::swap(fresh->images, frame_images_);
+  if (inverse_depth_sigma.empty()) {
+    const int level = PicturePoints::LevelOf(cameras_.levels);
+    fresh->picture.Take(fresh->images[level], fresh->depths[level],
+                        cameras_.camera[static_cast<std::size_t>(level)]);
+  }
   selector_.Select(*fresh);
   if (fresh->finest_points().size() < static_cast<std::size_t>(config_.min_points)) {
     std::swap(fresh->images, frame_images_);
@@ -219,6 +237,7 @@ void EdgeOdometry::ReserveBuffers() {
     }
     keyframe.thumbnail_points.Reserve(thumbnail);
     keyframe.surfaces.Reserve();
+    keyframe.picture.Reserve();
   }
   const std::size_t most =
       std::max(thumbnail, static_cast<std::size_t>(*std::max_element(config_.max_points.begin(),
@@ -300,7 +319,28 @@ SurfaceConstraint EdgeOdometry::SurfacesOf(const Keyframe& keyframe) const {
 void EdgeOdometry::Judge(Attempt& attempt) const {
   attempt.surfaces =
       SurfacesOf(*attempt.keyframe).Agreement(attempt.fine.state.new_from_reference, 1);
+  PicturePoints::Differences differences;
+  ComparePicture(*attempt.keyframe, attempt.fine.state.new_from_reference, differences);
+  if (differences.count > 0) {
+    attempt.picture = differences.ShareWithin(PictureBound(PictureNoise(*attempt.keyframe)));
+    attempt.picture_sigma = differences.Sigma();
+  }
   attempt.good = IsGood(attempt);
+}
+
+void EdgeOdometry::ComparePicture(const Keyframe& keyframe,
+                                  const Eigen::Isometry3d& new_from_reference,
+                                  PicturePoints::Differences& differences) const {
+  const int level = PicturePoints::LevelOf(cameras_.levels);
+  keyframe.picture.Compare(frame_images_[level], cameras_.camera[static_cast<std::size_t>(level)],
+                           new_from_reference, 1, differences);
+}
+
+/// How pixels differ that show the same: as in the last frames; at first as far as the camera's
+/// noise is known.
+double EdgeOdometry::PictureNoise(const Keyframe& keyframe) const {
+  const int level = PicturePoints::LevelOf(cameras_.levels);
+  return picture_noise_.value_or(2 * std::sqrt(keyframe.images.GradientNoise(level)));
 }
 
 /// Whether what a search found explains clearly more than what was followed, of the edges and of
@@ -321,8 +361,17 @@ bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) {
                                             result.state, found.noise);
     return ExplainedScore(result);
   };
-  return score(found.fine) * (both ? *here : 1) >
-         score(followed.fine) * (both ? *there : 1) + kBetterScore;
+  const double of_found = score(found.fine) * (both ? *here : 1);
+  const double of_followed = score(followed.fine) * (both ? *there : 1);
+  if (std::abs(of_found - of_followed) > kTold) return of_found > of_followed;
+  PicturePoints::Differences seen_here, seen_there;
+  ComparePicture(keyframe, found.fine.state.new_from_reference, seen_here);
+  ComparePicture(keyframe, followed.fine.state.new_from_reference, seen_there);
+  if (seen_here.count == 0 || seen_there.count == 0) return of_found > of_followed + kBetterScore;
+  const double noise = PictureBound(
+      std::max(PictureNoise(keyframe), std::min(seen_here.Sigma(), seen_there.Sigma())));
+  return of_found * seen_here.ShareWithin(noise) >
+         of_followed * seen_there.ShareWithin(noise) + kBetterScore;
 }
 
 /// How far the keyframe's points move over the image between a motion and an attempt's, px.
@@ -403,7 +452,7 @@ void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
   const bool unlike =
       attempt.fine.Agreement() < agreement_.value() - std::max(config_.strange_drop, UsualDrop());
-  if (!IsDisplaced(attempt) && !unlike) return;
+  if (!IsDisplaced(attempt) && !LooksUnlike(attempt) && !unlike) return;
   Eigen::Isometry3d& rival = attempt.rival.state.new_from_reference;
   rival = Expected(stamp_ns).inverse() * attempt.keyframe->world_from_camera;
   attempt.ambiguous = attempt.strange = PixelsFrom(rival, attempt) > kRivalPx;
@@ -417,6 +466,16 @@ double EdgeOdometry::LeastSurfaces() const {
   return surfaces_.value() - surfaces_.Drop(config_.surface_drop);
 }
 
+/// The share of the picture below which a frame is strange.
+double EdgeOdometry::LeastPicture() const {
+  return picture_.value() - picture_.Drop(config_.picture_drop);
+}
+
+/// Whether the picture of the frame contradicts the motion.
+bool EdgeOdometry::LooksUnlike(const Attempt& attempt) const {
+  return attempt.picture && picture_.value() > 0 && *attempt.picture < LeastPicture();
+}
+
 /// Whether the depth of the frame contradicts the motion.
 bool EdgeOdometry::IsDisplaced(const Attempt& attempt) const {
   return attempt.surfaces && *attempt.surfaces < LeastSurfaces();
@@ -428,7 +487,8 @@ bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
          attempt.fine.Agreement() >=
              agreement_.value() - std::max(config_.found_drop, UsualDrop()) &&
          attempt.surfaces.value_or(1) >=
-             std::min(LeastSurfaces(), surfaces_.value() - config_.found_drop);
+             std::min(LeastSurfaces(), surfaces_.value() - config_.found_drop) &&
+         attempt.picture.value_or(1) >= std::min(LeastPicture(), kFoundPicture * picture_.value());
 }
 
 /// Whether an alignment that began at a guess may have ended in a false minimum. The further a
@@ -439,7 +499,7 @@ bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) con
   const double drop = agreement_.value() - attempt.fine.Agreement();
   const bool exact = attempt.keyframe->finest_points().inverse_depth_sigma.empty();
   if (drop > (exact ? std::max(config_.found_drop, UsualDrop()) : UsualDrop())) return true;
-  if (drop < UsualDrop() / 4 && !IsDisplaced(attempt)) return false;
+  if (drop < UsualDrop() / 4 && !IsDisplaced(attempt) && !LooksUnlike(attempt)) return false;
   const auto predicted = Predicted(stamp_ns);
   if (!predicted) return true;
   const Eigen::Isometry3d reference_from_new = attempt.fine.state.new_from_reference.inverse();
@@ -457,6 +517,10 @@ EdgeOdometry::Attempt EdgeOdometry::SearchAmong(Keyframe& keyframe,
     return PointsOf(keyframe, level);
   };
   reference.surfaces = SurfacesOf(keyframe);
+  if (keyframe.picture.size() > 0) {
+    reference.picture = &keyframe.picture;
+    reference.picture_noise = PictureNoise(keyframe);
+  }
   const WideSearch::Outcome outcome = wide_search_.Search(proposals, frame_images_, reference);
   Attempt attempt;
   attempt.keyframe = &keyframe;
@@ -491,12 +555,13 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);
   const double enough = std::max(config_.feature_agreement, agreement_.value() - UsualDrop());
-  const bool is_convincing =
-      first.good && !first.ambiguous && first.fine.Agreement() >= enough && !IsDisplaced(first);
-  // Where nothing says how the camera moved before, the true motion may not be among these.
-  if (is_convincing && settled_ && course_) return first;
   proposals = {};
   proposals.Add(first.fine.state.new_from_reference);
+  const bool repeats = keyframe.picture.size() > 0 && wide_search_.ProposePeriods(proposals);
+  const bool is_convincing = first.good && !first.ambiguous && first.fine.Agreement() >= enough &&
+                             !IsDisplaced(first) && !(repeats && LooksUnlike(first));
+  // Where nothing says how the camera moved before, the true motion may not be among these.
+  if (is_convincing && settled_ && course_) return first;
   if (first.ambiguous) proposals.Add(first.rival.state.new_from_reference);
   WideSearch::ProposeAround(first.fine.state.new_from_reference, proposals);
   if (!is_convincing) ProposeByFeatures(keyframe, proposals);
@@ -505,6 +570,16 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeFan(*guesses.begin(), proposals);
   Attempt second = SearchAmong(keyframe, proposals);
   second.iterations += first.iterations;
+  const double least = picture_.value() > 0 ? LeastPicture() : kConvincingPicture;
+  for (int i = 0; i < kPeriodSearches && second.picture.value_or(1) < least; ++i) {
+    proposals = {};
+    proposals.Add(second.fine.state.new_from_reference);
+    if (!wide_search_.ProposePeriods(proposals)) break;
+    WideSearch::ProposeAround(second.fine.state.new_from_reference, proposals);
+    const int iterations = second.iterations;
+    second = SearchAmong(keyframe, proposals);
+    second.iterations += iterations;
+  }
   return second;
 }
 
@@ -615,6 +690,12 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   if (settled_) {  // What is doubted is not usual.
     agreement_.Add(fine.Agreement());
     if (attempt.surfaces) surfaces_.Add(*attempt.surfaces);
+    if (attempt.picture) {
+      picture_.Add(*attempt.picture);
+      picture_noise_ = picture_noise_ ? *picture_noise_ +
+                                            kNewestNoise * (attempt.picture_sigma - *picture_noise_)
+                                      : attempt.picture_sigma;
+    }
   }
   ForgetCourses();
   if (last_.state == VoState::kTracking) {

@@ -99,6 +99,8 @@ class EdgeOdometry {
     double agreement_drop = 0.04;
     /// or when so much less of the surfaces is where it should be than in the last frames,
     double surface_drop = 0.05;
+    /// or when so much less of the picture looks as the keyframe says.
+    double picture_drop = 0.15;
     /// A motion that was searched and agrees by so much less than the last frames is as doubtful as
     /// an ambiguous one.
     double strange_drop = 0.06;
@@ -196,6 +198,8 @@ class EdgeOdometry {
     int iterations = 0;
     double noise = kNoiseGrey;       ///< See WideSearch::Outcome.
     std::optional<double> surfaces;  ///< See VoResult.
+    std::optional<double> picture;   ///< Share of the keyframe's pixels that look the same,
+    double picture_sigma = 0;        ///< and how they differ, grey levels.
     bool good = false;
     bool ambiguous = false;
     bool strange = false;   ///< Ambiguous, but not for a rival that was found.
@@ -213,6 +217,11 @@ class EdgeOdometry {
   std::optional<Eigen::Isometry3d> Predicted(std::int64_t stamp_ns) const;
   double UsualDrop() const;
   double LeastSurfaces() const;
+  void ComparePicture(const Keyframe& keyframe, const Eigen::Isometry3d& new_from_reference,
+                      PicturePoints::Differences& differences) const;
+  double PictureNoise(const Keyframe& keyframe) const;
+  double LeastPicture() const;
+  bool LooksUnlike(const Attempt& attempt) const;
   bool IsDisplaced(const Attempt& attempt) const;
   bool IsRecognised(const Attempt& attempt) const;
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
@@ -260,7 +269,9 @@ class EdgeOdometry {
   // Whether the last motion was told apart from all others, or could not be in several frames.
   bool settled_ = false;
   UsualShare agreement_;                   // Of the edges,
-  UsualShare surfaces_{kSurfacesAtFirst};  // and of the surfaces.
+  UsualShare surfaces_{kSurfacesAtFirst};  // of the surfaces,
+  UsualShare picture_;                     // and of the picture;
+  std::optional<double> picture_noise_;    // how its pixels differ, grey levels.
   AlignmentState light_;                   // Gain and bias of the last frame.
 
   /// After the last frame, where it is known; the second one if that was ambiguous.

@@ -7,6 +7,7 @@
 #include "odometry/edge/edge_extractor.h"
 #include "odometry/edge/feature_motion.h"
 #include "odometry/edge/image_pyramid.h"
+#include "odometry/edge/picture_points.h"
 #include "odometry/edge/point_selector.h"
 #include "odometry/edge/surface_points.h"
 #include "odometry/se3.h"
@@ -30,6 +31,8 @@ struct Keyframe {
   EdgePoints thumbnail_points;  ///< Every pixel of the thumbnail, for rotations.
   /// Of its measured surfaces; none where depths are estimates.
   SurfacePoints surfaces;
+  /// Of its picture; none where depths are estimates.
+  PicturePoints picture;
   PictureFeatures features;  ///< Found when they are first needed.
 
   const EdgePoints& finest_points() const { return points[static_cast<std::size_t>(finest_level)]; }

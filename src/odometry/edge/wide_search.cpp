@@ -26,7 +26,10 @@ constexpr double kAmbiguousScore = 0.03;
 /// Who explains less than the best by more than this does not say what noise is; that is so many
 /// times the root of the mean cost.
 constexpr double kNearlyAsMuch = 0.1;
+constexpr double kNearlyAsMuchCoarsely = 0.2;
 constexpr double kNoiseSigmas = 3;
+/// Of the points of the picture, so many take part on coarser levels than the finest.
+constexpr std::size_t kCoarseEvery = 3;
 /// Of ProposeAround, rad, and how many turns of each.
 constexpr std::array<double, 2> kRingRadii = {0.02, 0.045};
 constexpr int kRingTurns = 8;
@@ -105,6 +108,31 @@ void WideSearch::ProposeMoves(const Eigen::Isometry3d& motion, double depth_m,
   }
 }
 
+bool WideSearch::ProposePeriods(MotionProposals& proposals) const {
+  std::array<Eigen::Isometry3d, kFineSurvivors> motions;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < std::min(count_, kFineSurvivors); ++i) {
+    const Eigen::Isometry3d& motion = candidates_[i].result.state.new_from_reference;
+    const auto is_near = [&](const Eigen::Isometry3d& other) {
+      return PixelsBetween(motion, other, mean_inverse_depth_, cameras_.camera[0].fx) < kRivalPx;
+    };
+    if (candidates_[i].score > candidates_[0].score - kNearlyAsMuch &&
+        std::none_of(motions.begin(), motions.begin() + count, is_near)) {
+      motions[count++] = motion;
+    }
+  }
+  for (std::size_t from = 0; from < count; ++from) {
+    for (std::size_t to = 0; to < count; ++to) {
+      if (to == from) continue;
+      const Eigen::Isometry3d period = motions[to] * motions[from].inverse();
+      for (std::size_t i = 0; i < count; ++i) {
+        if (i != from) proposals.Add(period * motions[i]);
+      }
+    }
+  }
+  return count > 1;
+}
+
 bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& images,
                                MotionProposals& proposals) {
   const ShiftSearch::Shifts shifts = shifts_.Find(keyframe.images.thumbnail(), images.thumbnail());
@@ -122,8 +150,9 @@ bool WideSearch::ProposeShifts(const Keyframe& keyframe, const ImagePyramid& ima
 }
 
 /// Aligns the candidates on a level and keeps the best that differ.
-void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level,
+void WideSearch::Refine(const EdgePoints& points, const ImagePyramid& images, int level,
                         const Reference& reference) {
+  const cv::Mat& grey = images[level];
   const SurfaceConstraint& surfaces = reference.surfaces;
   const std::size_t keep = level == cameras_.levels - 1 ? kCoarseSurvivors : kFineSurvivors;
   const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
@@ -144,6 +173,7 @@ void WideSearch::Refine(const EdgePoints& points, const cv::Mat& grey, int level
   }
   if (is_finest) AskNoise(points, grey, camera);
   AskSurfaces(surfaces, SurfaceBound(least_sigma));
+  if (reference.picture != nullptr) AskPicture(reference, images, is_finest);
   std::sort(candidates_.begin(), candidates_.begin() + static_cast<std::ptrdiff_t>(count_),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   std::size_t kept = 0;
@@ -195,6 +225,39 @@ void WideSearch::AskSurfaces(const SurfaceConstraint& surfaces, double bound) {
   for (std::size_t i = 0; i < count_; ++i) candidates_[i].score *= shares[i].value_or(least);
 }
 
+/// Multiplies the scores of those that explain nearly as much as the best by the share of the
+/// picture that agrees; the others stay behind them. What edges and surfaces tell apart is told:
+/// grey values change for more reasons.
+void WideSearch::AskPicture(const Reference& reference, const ImagePyramid& images,
+                            bool is_finest) {
+  const int level = PicturePoints::LevelOf(cameras_.levels);
+  const geo::CameraIntrinsics& camera = cameras_.camera[static_cast<std::size_t>(level)];
+  double best = 0;
+  for (std::size_t i = 0; i < count_; ++i) best = std::max(best, candidates_[i].score);
+  const double enough = std::max(0.0, best - (is_finest ? kNearlyAsMuch : kNearlyAsMuchCoarsely));
+  PicturePoints::Differences differences;
+  const auto compare = [&](const Candidate& candidate) {
+    differences.count = 0;
+    if (candidate.score <= enough) return false;
+    reference.picture->Compare(images[level], camera, candidate.result.state.new_from_reference,
+                               is_finest ? 1 : kCoarseEvery, differences);
+    return differences.count > 0;
+  };
+  double least_sigma = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (compare(candidates_[i])) least_sigma = std::min(least_sigma, differences.Sigma());
+  }
+  const double bound = PictureBound(std::max(least_sigma, reference.picture_noise));
+  std::array<std::optional<double>, MotionProposals::kMost> shares;
+  double least = 1;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (!compare(candidates_[i])) continue;
+    shares[i] = differences.ShareWithin(bound);
+    least = std::min(least, *shares[i]);
+  }
+  for (std::size_t i = 0; i < count_; ++i) candidates_[i].score *= shares[i].value_or(least);
+}
+
 WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const ImagePyramid& images,
                                        const Reference& reference) {
   Outcome outcome;
@@ -205,12 +268,11 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
     candidates_[count_++].result.state.new_from_reference = motion;
   }
   if (count_ == 0) return outcome;
-  double mean_inverse_depth = 0;
   for (int level = cameras_.levels - 1; level >= reference.finest_level; --level) {
     const EdgePoints& points = reference.points_of(level);
-    Refine(points, images[level], level, reference);
+    Refine(points, images, level, reference);
     for (std::size_t i = 0; i < count_; ++i) outcome.iterations += candidates_[i].result.iterations;
-    mean_inverse_depth = points.mean_inverse_depth;
+    mean_inverse_depth_ = points.mean_inverse_depth;
   }
   outcome.best = candidates_[0].result;
   outcome.noise = noise_;
@@ -219,7 +281,7 @@ WideSearch::Outcome WideSearch::Search(const MotionProposals& proposals, const I
     outcome.ambiguous =
         candidates_[i].score > candidates_[0].score - kAmbiguousScore &&
         PixelsBetween(outcome.best.state.new_from_reference, outcome.rival.state.new_from_reference,
-                      mean_inverse_depth, cameras_.camera[0].fx) > kRivalPx;
+                      mean_inverse_depth_, cameras_.camera[0].fx) > kRivalPx;
   }
   return outcome;
 }

@@ -17,7 +17,7 @@ namespace livemap::odometry {
 /// Motions to begin an alignment with, new_from_reference.
 class MotionProposals {
  public:
-  static constexpr std::size_t kMost = 72;
+  static constexpr std::size_t kMost = 96;
   /// More than kMost are passed over.
   void Add(const Eigen::Isometry3d& motion) {
     if (count_ < kMost) motions_[count_++] = motion;
@@ -55,7 +55,9 @@ class WideSearch {
     /// The points to align on a level; asked for once per level.
     std::function<const EdgePoints&(int level)> points_of;
     SurfaceConstraint surfaces;
-    int finest_level = 0;  ///< The last one that is aligned.
+    const PicturePoints* picture = nullptr;  ///< None: edges and surfaces alone.
+    double picture_noise = 0;                ///< How its pixels usually differ, grey levels.
+    int finest_level = 0;                    ///< The last one that is aligned.
   };
 
   WideSearch(const AlignmentConfig& config, const LevelCameras& cameras)
@@ -82,6 +84,11 @@ class WideSearch {
   static void ProposeMoves(const Eigen::Isometry3d& motion, double depth_m,
                            MotionProposals& proposals);
 
+  /// Adds what the motions that the last search could hardly tell apart say of a pattern's periods:
+  /// each difference between two of them, taken from every one of them. False where there is one
+  /// motion only.
+  bool ProposePeriods(MotionProposals& proposals) const;
+
   Outcome Search(const MotionProposals& proposals, const ImagePyramid& images,
                  const Reference& reference);
 
@@ -92,15 +99,18 @@ class WideSearch {
   };
 
   void AskSurfaces(const SurfaceConstraint& surfaces, double bound);
+  void AskPicture(const Reference& reference, const ImagePyramid& images, bool is_finest);
   void AskNoise(const EdgePoints& points, const cv::Mat& grey, const geo::CameraIntrinsics& camera);
-  void Refine(const EdgePoints& points, const cv::Mat& grey, int level, const Reference& reference);
+  void Refine(const EdgePoints& points, const ImagePyramid& images, int level,
+              const Reference& reference);
 
   Aligner aligner_;
   LevelCameras cameras_;
   ShiftSearch shifts_;
   std::array<Candidate, MotionProposals::kMost> candidates_;
   std::size_t count_ = 0;
-  double noise_ = kNoiseGrey;  // Of this search.
+  double mean_inverse_depth_ = 0;  // Of the points of the last level, 1/m.
+  double noise_ = kNoiseGrey;      // Of this search.
 };
 
 /// Share of the points that an alignment explains; those out of view count in part, so that looking

@@ -11,6 +11,7 @@
 #include "simulation/room/room_motion.h"
 #include "simulation/room/simulated_room.h"
 #include "simulation/sensors/depth_sensor.h"
+#include "test/odometry/chequered_wall.h"
 #include "test/odometry/synthetic_scene.h"
 
 namespace livemap::odometry {
@@ -126,6 +127,23 @@ TEST(WideSearch, AStepOfAQuarterOfTheViewAlongStripesIsFollowed) {
 TEST(WideSearch, AMotionThatWasFollowedIsNotForgottenOverTwoRivals) {
   const MovingThroughRoom moving(267, RoomMotion::kFastTurn, 1);
   EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 40 / 30.0), 0.01);
+}
+
+/// By how much the position after a sudden start along a wall of checks is wrong, m.
+double ErrorAfterStepsAlongChecks(double unlikeness) {
+  const ChequeredWall wall(unlikeness);
+  EdgeOdometry odometry({}, kWallCamera);
+  const auto truth = [](int frame) { return Pose(0.43 * frame, 0.17 * frame, 0, 0, 0, 0); };
+  VoResult result;
+  for (int frame = 0; frame < 4; ++frame) {
+    result = odometry.Track(wall.See(1'000'000'000 + frame * 100'000'000LL, truth(frame)));
+    EXPECT_EQ(result.state, VoState::kTracking) << frame;
+  }
+  return (result.world_from_camera.translation() - truth(3).translation()).norm();
+}
+
+TEST(WideSearch, ChecksWithShadesOfTheirOwnAreToldApart) {
+  EXPECT_LT(ErrorAfterStepsAlongChecks(8), 0.005);
 }
 
 TEST(WideSearch, AnEdgeThatFadesToNothingIsNotExplained) {
