@@ -102,7 +102,7 @@ class Draw {
     constexpr std::array<Pattern, 6> kPatterns = {Pattern::kChecks, Pattern::kStripes,
                                                   Pattern::kBricks, Pattern::kPatches,
                                                   Pattern::kNoise,  Pattern::kFaint};
-    // Of six surfaces three repeat and half of one is all but bare.
+    // Half of them repeat, a twelfth is all but bare.
     constexpr std::array<double, 6> kShares = {2, 2, 2, 3, 2, 1};
     BoxRoomSurface surface;
     surface.pattern =

@@ -30,7 +30,7 @@ struct BoxRoomSurface {
 
 /// A room of plain boxes that says whether odometry holds on pictures of another kind than the
 /// simulator's: it shares no code with that. One ray per pixel, so that slanted edges have steps;
-/// exact depth; one lamp; noise of one grey level. A third of the surfaces repeats, some hardly
+/// exact depth; one lamp; noise of one grey level. Half of the surfaces repeat, some hardly
 /// show anything. World frame: z up, origin in the middle of the floor, m.
 class BoxRoom {
  public:

@@ -344,7 +344,7 @@ double EdgeOdometry::PictureNoise(const Keyframe& keyframe) const {
 }
 
 /// Whether what a search found explains clearly more than what was followed, of the edges and of
-/// the surfaces; both of one keyframe.
+/// the surfaces, and of the picture where those hardly differ; both of one keyframe.
 bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) {
   Keyframe& keyframe = *followed.keyframe;
   const SurfaceConstraint surfaces = SurfacesOf(keyframe);

@@ -12,9 +12,10 @@
 
 namespace livemap::odometry {
 
-/// Pixels of a keyframe, spread evenly over its picture whether or not there are edges: where a
-/// motion is true, a later frame shows their grey values again. Of a pattern that repeats itself
-/// edges say the same in each of its periods; what tells one tile from the next is its shade.
+/// Pixels of a keyframe, spread over its picture, in each cell the one furthest from any edge:
+/// where a motion is true, a later frame shows their grey values again. Of a pattern that repeats
+/// itself edges say the same in each of its periods; what tells one tile from the next is its
+/// shade.
 class PicturePoints {
  public:
   static constexpr std::size_t kMost = 1200;
