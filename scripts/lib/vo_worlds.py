@@ -56,7 +56,7 @@ def box_table(rows):
     lines = ["| rooms | seeds | n | median ATE (m) | worst (m) | lost | false | NEES t: median, rooms above 2 | ms |",
              "|" + "---|" * 9]
     for row in rows:
-        seeds = f"{row['first_seed']}, {row['first_seed'] + 2}, ... {row['each'][-1]['seed']}"
+        seeds = f"every 2nd, {row['first_seed']} to {row['each'][-1]['seed']}"
         lines.append(f"| {row['trial']} | {seeds} | {row['rooms']} | {cell(row['median_ate_m'], 5)} "
                      f"| {cell(row['worst_ate_m'], 4)} | {row['lost']} of {row['frames']} | {row['false_rooms']} "
                      f"| {cell(row['median_nees_translation'], 2)}, {row['rooms_above_nees_2']} "
