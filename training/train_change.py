@@ -14,6 +14,7 @@ goes on with a finished network, of which the export will do, and teaches it sma
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Optional, Sequence
 
@@ -31,7 +32,7 @@ from change.validation import RegisteredPair, photo_pairs, registered_pairs, tor
 from common.training import (
     EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
     checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, load_checkpoint,
-    prepare_device,
+    precision_on, prepare_device,
 )
 
 VALIDATION_PHOTOS = 60
@@ -172,8 +173,8 @@ def run(arguments: argparse.Namespace) -> None:
     settings = settings_from(arguments)
     device = prepare_device(arguments)
     finished = load_averaged(checkpoint_to_start_from(arguments)) if settings.refine else None
-    trainer = Trainer(settings, device, finished)
     begun = checkpoint_to_resume(arguments, device)
+    trainer = Trainer(replace(settings, precision=precision_on(device, settings.precision, begun)), device, finished)
     if begun:
         trainer.restore(begun)
     elif arguments.start_from and finished is None:

@@ -10,7 +10,7 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common.training import (
     EpochSamples, ModelEma, Run, UsageError, add_loop_arguments, add_run_arguments, check_arguments, checkpoint_to_resume,
     checkpoint_to_start_from, exit_status, fields_given, learning_rate_factor, load_checkpoint,
-    prepare_device,
+    precision_on, prepare_device,
 )
 from detector import data, sets
 from detector.augment import Augmenter
@@ -238,8 +238,8 @@ def run(arguments: argparse.Namespace) -> None:
     """Train from the checkpoint, or from the start, to the last epoch."""
     settings = settings_from(arguments)
     device = prepare_device(arguments)
-    trainer = Trainer(settings, device)
     begun = checkpoint_to_resume(arguments, device)
+    trainer = Trainer(replace(settings, precision=precision_on(device, settings.precision, begun)), device)
     if begun:
         trainer.restore(begun)
     elif arguments.start_from:

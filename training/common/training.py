@@ -184,7 +184,7 @@ def add_loop_arguments(parser: argparse.ArgumentParser, settings: Any, validate_
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
     parser.add_argument("--learning-rate", type=float, default=settings.learning_rate)
     parser.add_argument("--settle", type=float, default=settings.settle, help="last fraction of the epochs: whole pictures, weakly changed")
-    parser.add_argument("--precision", choices=("bf16", "fp32"), default=settings.precision)
+    parser.add_argument("--precision", choices=("auto", "bf16", "fp32"), default="auto", help="auto: bf16 where the device calculates in it")
 
 
 def check_arguments(arguments: argparse.Namespace) -> None:
@@ -221,6 +221,26 @@ def prepare_device(arguments: argparse.Namespace) -> torch.device:
     torch.set_num_threads(arguments.threads)
     cv2.setNumThreads(0)
     return torch.device("cuda" if cuda and wanted != "cpu" else "cpu")
+
+
+def calculates_in_bf16(device: torch.device) -> bool:
+    """Whether bfloat16 is faster than float32 there; a processor without such instructions is ten times slower in it."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported()
+    try:
+        processor = Path("/proc/cpuinfo").read_text().split()
+    except OSError:
+        return False
+    return "avx512_bf16" in processor or "amx_bf16" in processor
+
+
+def precision_on(device: torch.device, wanted: str, begun: Optional[Dict[str, Any]]) -> str:
+    """What --precision means: auto goes on as the checkpoint was written, and begins as the device is fast."""
+    if wanted != "auto":
+        return wanted
+    if begun:
+        return begun["settings"].get("precision", "bf16")
+    return "bf16" if calculates_in_bf16(device) else "fp32"
 
 
 def checkpoint_to_resume(arguments: argparse.Namespace, device: torch.device) -> Optional[Dict[str, Any]]:

@@ -83,6 +83,16 @@ class Programs(unittest.TestCase):
         for name, tensor in whole["average"].items():
             torch.testing.assert_close(continued["average"][name], tensor, rtol=0, atol=0, msg=name)
 
+    def test_precision_is_the_checkpoints_else_what_the_device_is_fast_in(self):
+        with unittest.mock.patch.object(training, "calculates_in_bf16", lambda device: True):
+            self.assertEqual(training.precision_on("cpu", "auto", None), "bf16")
+            self.assertEqual(training.precision_on("cpu", "fp32", None), "fp32")
+            self.assertEqual(training.precision_on("cpu", "auto", {"settings": {"precision": "fp32"}}), "fp32")
+        with unittest.mock.patch.object(training, "calculates_in_bf16", lambda device: False):
+            self.assertEqual(training.precision_on("cpu", "auto", None), "fp32")
+            self.assertEqual(training.precision_on("cpu", "bf16", None), "bf16")
+            self.assertEqual(training.precision_on("cpu", "auto", {"settings": {}}), "bf16", "as older runs were")
+
     def test_by_the_clock_the_schedule_ends_with_its_minutes(self):
         ticks = itertools.count(step=10)  # so many seconds from one look at the clock to the next: an epoch takes 30
         with unittest.mock.patch.object(train_detector.time, "monotonic", lambda: float(next(ticks))):
