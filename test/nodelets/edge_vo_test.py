@@ -171,6 +171,17 @@ class EdgeVoTest(unittest.TestCase):
         moved = numpy.linalg.norm(base_pose(vehicle.poses()[-1].pose.pose)[:3, 3])
         self.assertGreater(moved, 0.05, "the camera moved, so base_link did")
 
+    def test_frames_that_come_at_once_are_accounted_for_and_the_newest_is_followed(self):
+        vehicle = self.loaded(waiting_frames=1)
+        for frame in self.frames:
+            for topic in (INFO, DEPTH, IMAGE):
+                vehicle.send(topic, frame[topic])
+        newest = self.frames[-1][IMAGE].header.stamp
+        eventually(lambda: vehicle.poses() and vehicle.poses()[-1].header.stamp == newest, "the newest is followed")
+        vehicle.wait_for(frames_waiting=0, frames=len(vehicle.poses()), frames_dropped=0)
+        values = {key: int(vehicle.diagnostics()[key]) for key in ("frames_in", "frames", "frames_displaced")}
+        self.assertEqual(values["frames_in"], values["frames"] + values["frames_displaced"], values)
+
     def test_edges_points_and_path_are_there_for_those_who_listen(self):
         vehicle = self.loaded(path_spacing_m=0.01, cloud_voxel_m=0.0)
         self.play(vehicle, self.frames)

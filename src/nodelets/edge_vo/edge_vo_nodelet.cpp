@@ -25,6 +25,7 @@
 #include "nodelets/bounded_tf_listener.h"
 #include "nodelets/diagnostics.h"
 #include "nodelets/edge_vo/eye_choice.h"
+#include "nodelets/edge_vo/frame_backlog.h"
 #include "nodelets/edge_vo/mono_eye.h"
 #include "nodelets/edge_vo/mounting_watch.h"
 #include "nodelets/nodelet_part.h"
@@ -80,6 +81,12 @@ class EdgeVoPart : public NodeletPart {
       message_filters::sync_policies::ExactTime<sensor_msgs::Image, sensor_msgs::CameraInfo>;
   using TwistConstPtr = geometry_msgs::TwistWithCovarianceStampedConstPtr;
 
+  /// An image with its calibration, and with depth where that is followed.
+  struct Taken {
+    ImageConstPtr image;
+    ImageConstPtr depth;  // None: one eye follows the image.
+    InfoConstPtr info;
+  };
   /// Messages that came on an input topic since the last warning.
   struct Arrivals {
     int images = 0, depths = 0, infos = 0, frames = 0;
@@ -103,6 +110,9 @@ class EdgeVoPart : public NodeletPart {
     stamps_ = std::make_unique<StampChecks>(getName(), config_.max_stamp_ahead_s,
                                             [this] { OnTimeReset(); });
     mounting_ = std::make_unique<MountingWatch>(node, getName(), config_, tf_buffer_);
+    backlog_ = std::make_unique<FrameBacklog<Taken>>(
+        static_cast<std::size_t>(config_.waiting_frames), *node.getCallbackQueue(),
+        [this](const Taken& taken) { Work(taken); });
     odometry_publisher_ = node.advertise<nav_msgs::Odometry>("odom", 10);
     path_publisher_ = node.advertise<nav_msgs::Path>("vo/path", 1);
     cloud_publisher_ = node.advertise<sensor_msgs::PointCloud2>("vo/points", 1);
@@ -121,7 +131,8 @@ class EdgeVoPart : public NodeletPart {
     const image_transport::TransportHints raw("raw", ros::TransportHints().tcpNoDelay(),
                                               getPrivateNodeHandle());
     MakeSynchronizer();
-    // ROS's own queues have no bound: the synchroniser's have, and drop what finds no partner.
+    // ROS's own queues have no bound, so that no message is lost whose partner is kept: the
+    // synchroniser's have one, and so has the backlog.
     image_subscriber_ = transport.subscribe(
         "camera_rect/image", 0,
         boost::function<void(const ImageConstPtr&)>([this](const ImageConstPtr& image) {
@@ -220,6 +231,7 @@ class EdgeVoPart : public NodeletPart {
   /// the synchroniser would stay there, newer than all that comes.
   void OnTimeReset() {
     MakeSynchronizer();
+    backlog_->Clear();
     choice_->OnTimeReset();
     if (!odometry_ && !mono_) return;
     NODELET_WARN("the images' stamps went back: odometry starts anew");
@@ -242,39 +254,50 @@ class EdgeVoPart : public NodeletPart {
                    config_.eye_wait_s);
     }
     ++arrivals_.frames;
+    backlog_->Push({image, nullptr, info});
+  }
+
+  /// An image with its calibration and its depth.
+  void OnFrame(const ImageConstPtr& image, const ImageConstPtr& depth, const InfoConstPtr& info) {
+    if (!choice_->OnDepth(ros_io::FromRosTime(image->header.stamp))) return;
+    ++arrivals_.frames;
+    backlog_->Push({image, depth, info});
+  }
+
+  void Work(const Taken& taken) {
     try {
-      PrepareMono(*info, image->header);
-      Follow(image->header, [&](odometry::RgbdFrame& frame) {
-        const auto grey = cv_bridge::toCvShare(image, sensor_msgs::image_encodings::MONO8);
-        frame.grey = grey->image;
-        const std::int64_t stamp_ns = ros_io::FromRosTime(image->header.stamp);
-        return mono_->Track(stamp_ns, frame.grey, speed_.At(stamp_ns));
-      });
+      if (taken.depth) {
+        FollowByDepth(taken);
+      } else {
+        FollowByOneEye(taken);
+      }
     } catch (const std::exception& error) {
       Drop(error);
     }
+  }
+
+  void FollowByOneEye(const Taken& taken) {
+    PrepareMono(*taken.info, taken.image->header);
+    Follow(taken.image->header, [&](odometry::RgbdFrame& frame) {
+      const auto grey = cv_bridge::toCvShare(taken.image, sensor_msgs::image_encodings::MONO8);
+      frame.grey = grey->image;
+      const std::int64_t stamp_ns = ros_io::FromRosTime(taken.image->header.stamp);
+      return mono_->Track(stamp_ns, frame.grey, speed_.At(stamp_ns));
+    });
+  }
+
+  void FollowByDepth(const Taken& taken) {
+    if (mono_) LeaveMono(taken.image->header.stamp);
+    Prepare(*taken.info, taken.image->header);
+    Follow(taken.image->header, [&](odometry::RgbdFrame& frame) {
+      frame = ToFrame(taken.image, taken.depth);
+      return odometry_->Track(frame);
+    });
   }
 
   void Drop(const std::exception& error) {
     ++figures_.dropped;
     NODELET_WARN_THROTTLE(kSayAgainS, "dropped a frame: %s", error.what());
-  }
-
-  /// An image with its calibration and its depth.
-  void OnFrame(const ImageConstPtr& image, const ImageConstPtr& depth, const InfoConstPtr& info) {
-    const Eye before = choice_->eye();
-    if (!choice_->OnDepth(ros_io::FromRosTime(image->header.stamp))) return;
-    if (before == Eye::kMono) LeaveMono(image->header.stamp);
-    ++arrivals_.frames;
-    try {
-      Prepare(*info, image->header);
-      Follow(image->header, [&](odometry::RgbdFrame& frame) {
-        frame = ToFrame(image, depth);
-        return odometry_->Track(frame);
-      });
-    } catch (const std::exception& error) {
-      Drop(error);
-    }
   }
 
   /// One image, as `track` does it, which fills in the frame.
@@ -464,6 +487,7 @@ class EdgeVoPart : public NodeletPart {
   }
 
   bool OnReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    backlog_->Clear();
     ResetOdometry();
     response.success = true;
     response.message = "the next frame is the origin";
@@ -503,8 +527,11 @@ class EdgeVoPart : public NodeletPart {
     std::sort(times.begin(), times.end());
     status.add("eye", EyeName(choice_->eye()));
     status.add("state", odometry::VoStateName(last_.state));
+    status.add("frames_in", backlog_->in());
     status.add("frames", figures_.frames);
     status.add("frames_dropped", figures_.dropped);
+    status.add("frames_displaced", backlog_->displaced());
+    status.add("frames_waiting", backlog_->waiting());
     status.add("frames_lost", figures_.lost);
     status.add("keyframes", figures_.keyframes);
     status.add("resets", figures_.resets);
@@ -540,6 +567,7 @@ class EdgeVoPart : public NodeletPart {
   ros_io::OdometryFrames frames_;
   geo::CameraIntrinsics camera_;
   std::unique_ptr<EyeChoice> choice_;
+  std::unique_ptr<FrameBacklog<Taken>> backlog_;
   std::unique_ptr<odometry::EdgeOdometry> odometry_;  // By depth.
   std::unique_ptr<MonoEye> mono_;                     // By one eye.
   odometry::VehicleSpeed speed_{{}};                  // For one eye.

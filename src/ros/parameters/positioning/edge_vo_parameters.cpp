@@ -146,6 +146,9 @@ EdgeVoConfig ReadEdgeVoConfig(ParameterReader& parameters) {
                         "How image, depth and calibration are matched by their stamps.");
   parameters.Read("queue_size", config.queue_size, {1, 1000},
                   "Messages of each of the three topics that may wait for the others.");
+  parameters.Read("waiting_frames", config.waiting_frames, {1, 1000},
+                  "Frames that may wait while one is followed. When one more comes, the oldest is "
+                  "left out and counted in frames_displaced: a longer queue only adds latency.");
   ReadDepthUnits(parameters, config.depth_units_per_m);
   parameters.Read("odom_frame", config.odom_frame, "Frame of the odometry, after REP 105.");
   parameters.Read("base_frame", config.base_frame, "Frame of the vehicle, after REP 105.");

@@ -23,6 +23,7 @@ struct EdgeVoConfig {
   bool publish_mounting = true;     ///< On tf.
   std::string sync = "exact";       ///< "exact" or "approximate".
   int queue_size = 10;              ///< Messages that may wait for their partners.
+  int waiting_frames = 4;           ///< Frames that may wait while one is followed.
   double depth_units_per_m = 1000;  ///< Of 16-bit depth (REP 118).
   std::string odom_frame = "odom";
   std::string base_frame = "base_link";
