@@ -16,14 +16,8 @@ namespace {
 constexpr double kMaxPredictionS = 0.5;
 /// Below this reciprocal condition number the information matrix says nothing about some direction.
 constexpr double kMinCondition = 1e-12;
-/// Weight of the newest frame in what is usual.
-constexpr double kNewestNoise = 0.2;
 /// So many more searches follow one whose outcome looks unlike the keyframe.
 constexpr int kPeriodSearches = 2;
-/// Of what is usual, so much of the picture looks the same where a camera finds back.
-constexpr double kFoundPicture = 0.6;
-/// A share of the picture that is convincing before anything is usual.
-constexpr double kConvincingPicture = 0.8;
 /// What a search finds must explain this much more to be preferred to what was there.
 constexpr double kBetterScore = 0.03;
 /// Where edges and surfaces explain this much more or less, the picture is not asked.
@@ -68,7 +62,8 @@ EdgeOdometry::EdgeOdometry(const Config& config, const geo::CameraIntrinsics& in
       selector_({config.edges, config.points, config.max_points}, cameras_),
       aligner_(config.alignment),
       rotation_aligner_(OdometryOfRotationOnly(config.alignment)),
-      wide_search_(config.alignment, cameras_) {}
+      wide_search_(config.alignment, cameras_),
+      usual_(config.usual) {}
 
 EdgeOdometry::~EdgeOdometry() = default;
 
@@ -83,14 +78,7 @@ void EdgeOdometry::Reset() {
   ForgetCourses();
   ambiguous_frames_ = 0;
   searched_keyframes_ = 0;
-  ForgetUsual();
-}
-
-void EdgeOdometry::ForgetUsual() {
-  agreement_.Forget();
-  surfaces_.Forget();
-  picture_.Forget();
-  picture_noise_.reset();
+  usual_.Forget();
 }
 
 void EdgeOdometry::ForgetCourses() {
@@ -130,7 +118,7 @@ VoResult EdgeOdometry::Track(const RgbdFrame& frame) {
       result.new_keyframe = MakeKeyframe(frame, {}, result);
       if (gives_up && result.new_keyframe) {
         result.state = VoState::kTracking;
-        ForgetUsual();  // It may be another place.
+        usual_.Forget();  // It may be another place.
       }
     }
   }
@@ -317,13 +305,16 @@ SurfaceConstraint EdgeOdometry::SurfacesOf(const Keyframe& keyframe) const {
 }
 
 void EdgeOdometry::Judge(Attempt& attempt) const {
-  attempt.surfaces =
+  attempt.evidence = {};
+  attempt.evidence.agreement = attempt.fine.Agreement();
+  attempt.evidence.surfaces =
       SurfacesOf(*attempt.keyframe).Agreement(attempt.fine.state.new_from_reference, 1);
   PicturePoints::Differences differences;
   ComparePicture(*attempt.keyframe, attempt.fine.state.new_from_reference, differences);
   if (differences.count > 0) {
-    attempt.picture = differences.ShareWithin(PictureBound(PictureNoise(*attempt.keyframe)));
-    attempt.picture_sigma = differences.Sigma();
+    attempt.evidence.picture =
+        differences.ShareWithin(PictureBound(PictureNoise(*attempt.keyframe)));
+    attempt.evidence.picture_sigma = differences.Sigma();
   }
   attempt.good = IsGood(attempt);
 }
@@ -340,7 +331,7 @@ void EdgeOdometry::ComparePicture(const Keyframe& keyframe,
 /// noise is known.
 double EdgeOdometry::PictureNoise(const Keyframe& keyframe) const {
   const int level = PicturePoints::LevelOf(cameras_.levels);
-  return picture_noise_.value_or(2 * std::sqrt(keyframe.images.GradientNoise(level)));
+  return usual_.picture_noise().value_or(2 * std::sqrt(keyframe.images.GradientNoise(level)));
 }
 
 /// Whether what a search found explains clearly more than what was followed, of the edges and of
@@ -450,45 +441,21 @@ void EdgeOdometry::TellApart(std::int64_t stamp_ns, Attempt& attempt) const {
 /// next frame is searched, too.
 void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
-  const bool unlike =
-      attempt.fine.Agreement() < agreement_.value() - std::max(config_.strange_drop, UsualDrop());
-  if (!IsDisplaced(attempt) && !LooksUnlike(attempt) && !unlike) return;
+  const bool explains_little =
+      attempt.evidence.agreement < usual_.agreement() - usual_.StrangeDrop();
+  if (!usual_.IsDisplaced(attempt.evidence) && !usual_.LooksUnlike(attempt.evidence) &&
+      !explains_little) {
+    return;
+  }
   Eigen::Isometry3d& rival = attempt.rival.state.new_from_reference;
   rival = Expected(stamp_ns).inverse() * attempt.keyframe->world_from_camera;
   attempt.ambiguous = attempt.strange = PixelsFrom(rival, attempt) > kRivalPx;
 }
 
-/// By how much a frame's agreement may fall short of the last ones' without being strange.
-double EdgeOdometry::UsualDrop() const { return agreement_.Drop(config_.agreement_drop); }
-
-/// The share of the surfaces below which a frame is strange.
-double EdgeOdometry::LeastSurfaces() const {
-  return surfaces_.value() - surfaces_.Drop(config_.surface_drop);
-}
-
-/// The share of the picture below which a frame is strange.
-double EdgeOdometry::LeastPicture() const {
-  return picture_.value() - picture_.Drop(config_.picture_drop);
-}
-
-/// Whether the picture of the frame contradicts the motion.
-bool EdgeOdometry::LooksUnlike(const Attempt& attempt) const {
-  return attempt.picture && picture_.value() > 0 && *attempt.picture < LeastPicture();
-}
-
-/// Whether the depth of the frame contradicts the motion.
-bool EdgeOdometry::IsDisplaced(const Attempt& attempt) const {
-  return attempt.surfaces && *attempt.surfaces < LeastSurfaces();
-}
-
 /// Whether a place that was looked for without any prior looks as places did before.
 bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
   return attempt.good && attempt.fine.Overlap() >= config_.min_overlap &&
-         attempt.fine.Agreement() >=
-             agreement_.value() - std::max(config_.found_drop, UsualDrop()) &&
-         attempt.surfaces.value_or(1) >=
-             std::min(LeastSurfaces(), surfaces_.value() - config_.found_drop) &&
-         attempt.picture.value_or(1) >= std::min(LeastPicture(), kFoundPicture * picture_.value());
+         usual_.IsRecognised(attempt.evidence);
 }
 
 /// Whether an alignment that began at a guess may have ended in a false minimum. The further a
@@ -496,16 +463,19 @@ bool EdgeOdometry::IsRecognised(const Attempt& attempt) const {
 /// the motion goes on as it was. Where depths are estimates, it says that the depths err.
 bool EdgeOdometry::IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const {
   if (!attempt.good || !settled_) return true;
-  const double drop = agreement_.value() - attempt.fine.Agreement();
+  const double drop = usual_.agreement() - attempt.evidence.agreement;
   const bool exact = attempt.keyframe->finest_points().inverse_depth_sigma.empty();
-  if (drop > (exact ? std::max(config_.found_drop, UsualDrop()) : UsualDrop())) return true;
-  if (drop < UsualDrop() / 4 && !IsDisplaced(attempt) && !LooksUnlike(attempt)) return false;
+  if (drop > (exact ? usual_.FoundDrop() : usual_.AgreementDrop())) return true;
+  if (drop < usual_.AgreementDrop() / 4 && !usual_.IsDisplaced(attempt.evidence) &&
+      !usual_.LooksUnlike(attempt.evidence)) {
+    return false;
+  }
   const auto predicted = Predicted(stamp_ns);
   if (!predicted) return true;
   const Eigen::Isometry3d reference_from_new = attempt.fine.state.new_from_reference.inverse();
   const double surprise = Motion(*attempt.keyframe, *predicted,
                                  attempt.keyframe->world_from_camera * reference_from_new);
-  return surprise > (drop > UsualDrop() ? config_.surprise / 2 : config_.surprise);
+  return surprise > (drop > usual_.AgreementDrop() ? config_.surprise / 2 : config_.surprise);
 }
 
 /// One search among the proposals.
@@ -554,12 +524,14 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeAround(*guesses.begin(), proposals);
   if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
   const Attempt first = SearchAmong(keyframe, proposals);
-  const double enough = std::max(config_.feature_agreement, agreement_.value() - UsualDrop());
+  const double enough =
+      std::max(config_.feature_agreement, usual_.agreement() - usual_.AgreementDrop());
   proposals = {};
   proposals.Add(first.fine.state.new_from_reference);
   const bool repeats = keyframe.picture.size() > 0 && wide_search_.ProposePeriods(proposals);
-  const bool is_convincing = first.good && !first.ambiguous && first.fine.Agreement() >= enough &&
-                             !IsDisplaced(first) && !(repeats && LooksUnlike(first));
+  const bool is_convincing = first.good && !first.ambiguous && first.evidence.agreement >= enough &&
+                             !usual_.IsDisplaced(first.evidence) &&
+                             !(repeats && usual_.LooksUnlike(first.evidence));
   // Where nothing says how the camera moved before, the true motion may not be among these.
   if (is_convincing && settled_ && course_) return first;
   if (first.ambiguous) proposals.Add(first.rival.state.new_from_reference);
@@ -570,8 +542,8 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeFan(*guesses.begin(), proposals);
   Attempt second = SearchAmong(keyframe, proposals);
   second.iterations += first.iterations;
-  const double least = picture_.value() > 0 ? LeastPicture() : kConvincingPicture;
-  for (int i = 0; i < kPeriodSearches && second.picture.value_or(1) < least; ++i) {
+  for (int i = 0;
+       i < kPeriodSearches && second.evidence.picture.value_or(1) < usual_.LeastPicture(); ++i) {
     proposals = {};
     proposals.Add(second.fine.state.new_from_reference);
     if (!wide_search_.ProposePeriods(proposals)) break;
@@ -624,7 +596,7 @@ bool EdgeOdometry::IsGood(const Attempt& attempt) const {
   const AlignmentResult& result = attempt.fine;
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
-  const bool is_measured = attempt.surfaces.value_or(0) >= kSureSurfaces;
+  const bool is_measured = attempt.evidence.surfaces.value_or(0) >= kSureSurfaces;
   return std::isfinite(result.cost) &&
          IsBelievableMove(result.state.new_from_reference,
                           attempt.keyframe->finest_points().mean_inverse_depth) &&
@@ -633,7 +605,8 @@ bool EdgeOdometry::IsGood(const Attempt& attempt) const {
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
          result.Overlap() >= (is_measured ? config_.min_measured_overlap : config_.min_overlap) &&
          result.sigma <= config_.lost_sigma && result.Agreement() >= config_.min_agreement &&
-         attempt.surfaces.value_or(1) >= config_.min_surfaces && IsBelievableLight(result.state);
+         attempt.evidence.surfaces.value_or(1) >= config_.min_surfaces &&
+         IsBelievableLight(result.state);
 }
 
 bool EdgeOdometry::WantsKeyframe(const AlignmentResult& result,
@@ -687,16 +660,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   const double step_s = Seconds(stamp_ns - *last_stamp_ns_);
   ambiguous_frames_ = attempt.ambiguous ? ambiguous_frames_ + 1 : 0;
   settled_ = ambiguous_frames_ == 0 || ambiguous_frames_ > config_.max_ambiguous_frames;
-  if (settled_) {  // What is doubted is not usual.
-    agreement_.Add(fine.Agreement());
-    if (attempt.surfaces) surfaces_.Add(*attempt.surfaces);
-    if (attempt.picture) {
-      picture_.Add(*attempt.picture);
-      picture_noise_ = picture_noise_ ? *picture_noise_ +
-                                            kNewestNoise * (attempt.picture_sigma - *picture_noise_)
-                                      : attempt.picture_sigma;
-    }
-  }
+  if (settled_) usual_.Add(attempt.evidence);  // What is doubted is not usual.
   ForgetCourses();
   if (last_.state == VoState::kTracking) {
     const auto course_to = [&](const Eigen::Isometry3d& world_from_camera) {
@@ -720,7 +684,7 @@ VoResult EdgeOdometry::Accept(const Attempt& attempt, std::int64_t stamp_ns) {
   result.sigma = fine.sigma;
   result.overlap = fine.Overlap();
   result.agreement = fine.Agreement();
-  result.surfaces = attempt.surfaces;
+  result.surfaces = attempt.evidence.surfaces;
   result.iterations = attempt.iterations;
   return result;
 }

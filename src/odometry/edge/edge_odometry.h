@@ -12,7 +12,7 @@
 #include "odometry/edge/keyframe.h"
 #include "odometry/edge/keyframe_point_selector.h"
 #include "odometry/edge/rgbd_frame.h"
-#include "odometry/edge/usual_share.h"
+#include "odometry/edge/usual_evidence.h"
 #include "odometry/edge/wide_search.h"
 
 namespace livemap::odometry {
@@ -93,22 +93,13 @@ class EdgeOdometry {
     double min_agreement = 0.5;
     /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
     double min_surfaces = 0.5;
-    /// An alignment is doubted, and the motion searched widely, when its agreement is smaller by
-    /// this than what the last frames had, and by more than UsualShare allows, while the points are
-    /// further than half of `surprise` from where the last motion brings them,
-    double agreement_drop = 0.04;
-    /// or when so much less of the surfaces is where it should be than in the last frames,
-    double surface_drop = 0.05;
-    /// or when so much less of the picture looks as the keyframe says.
-    double picture_drop = 0.15;
-    /// A motion that was searched and agrees by so much less than the last frames is as doubtful as
-    /// an ambiguous one.
-    double strange_drop = 0.06;
-    /// A camera that finds back must agree as well as the last frames but for this, of the edges
-    /// and of the surfaces. An alignment with less agreement than that is doubted, too,
-    double found_drop = 0.15;
-    /// or smaller than theirs by a fourth of that while the points are further than so much from
-    /// where the last motion brings them, share of the image's width.
+    /// An alignment is doubted, and the motion searched widely, when its agreement is smaller than
+    /// usual by these drops, or its surfaces or picture are, while the points are further than half
+    /// of `surprise` from where the last motion brings them, share of the image's width. A smaller
+    /// agreement than a camera that finds back must have is doubted anyway; one smaller by a fourth
+    /// of the drop, or no smaller, beyond all of `surprise`. A motion that was searched and is
+    /// stranger than `usual.strange` is as doubtful as an ambiguous one.
+    UsualEvidence::Drops usual;
     double surprise = 0.012;
     /// So many frames in a row may wait for a keyframe because their motion is ambiguous.
     int max_ambiguous_frames = 2;
@@ -173,9 +164,6 @@ class EdgeOdometry {
   const Keyframe* keyframe() const { return keyframe_; }
 
  private:
-  /// Share of the surfaces that is expected before anything is usual.
-  static constexpr double kSurfacesAtFirst = 0.95;
-
   /// Starts of an alignment; at most four.
   struct Guesses {
     std::array<Eigen::Isometry3d, 4> new_from_reference;
@@ -196,10 +184,8 @@ class EdgeOdometry {
     Keyframe* keyframe = nullptr;
     AlignmentResult fine;
     int iterations = 0;
-    double noise = kNoiseGrey;       ///< See WideSearch::Outcome.
-    std::optional<double> surfaces;  ///< See VoResult.
-    std::optional<double> picture;   ///< Share of the keyframe's pixels that look the same,
-    double picture_sigma = 0;        ///< and how they differ, grey levels.
+    double noise = kNoiseGrey;  ///< See WideSearch::Outcome.
+    Evidence evidence;
     bool good = false;
     bool ambiguous = false;
     bool strange = false;   ///< Ambiguous, but not for a rival that was found.
@@ -215,14 +201,9 @@ class EdgeOdometry {
   Attempt Follow(std::int64_t stamp_ns);
   Eigen::Isometry3d Expected(std::int64_t stamp_ns) const;
   std::optional<Eigen::Isometry3d> Predicted(std::int64_t stamp_ns) const;
-  double UsualDrop() const;
-  double LeastSurfaces() const;
   void ComparePicture(const Keyframe& keyframe, const Eigen::Isometry3d& new_from_reference,
                       PicturePoints::Differences& differences) const;
   double PictureNoise(const Keyframe& keyframe) const;
-  double LeastPicture() const;
-  bool LooksUnlike(const Attempt& attempt) const;
-  bool IsDisplaced(const Attempt& attempt) const;
   bool IsRecognised(const Attempt& attempt) const;
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
@@ -243,7 +224,6 @@ class EdgeOdometry {
                 const Eigen::Isometry3d& world_from_other) const;
   void ForgetNearOnes();
   void ReserveBuffers();
-  void ForgetUsual();
   void ForgetCourses();
   VoResult Accept(const Attempt& attempt, std::int64_t stamp_ns);
   Eigen::Isometry3d Continued(const Attempt& attempt, std::int64_t stamp_ns) const;
@@ -268,11 +248,8 @@ class EdgeOdometry {
   int ambiguous_frames_ = 0;            // In a row.
   // Whether the last motion was told apart from all others, or could not be in several frames.
   bool settled_ = false;
-  UsualShare agreement_;                   // Of the edges,
-  UsualShare surfaces_{kSurfacesAtFirst};  // of the surfaces,
-  UsualShare picture_;                     // and of the picture;
-  std::optional<double> picture_noise_;    // how its pixels differ, grey levels.
-  AlignmentState light_;                   // Gain and bias of the last frame.
+  UsualEvidence usual_;
+  AlignmentState light_;  // Gain and bias of the last frame.
 
   /// After the last frame, where it is known; the second one if that was ambiguous.
   std::optional<Course> course_, rival_course_;
