@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "common/median.h"
-#include "odometry/bilinear.h"
 #include "odometry/edge/seen_movements.h"
 
 namespace livemap::odometry {
@@ -18,7 +17,6 @@ constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays 
 constexpr double kMinVisibleShare = 0.1;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
-constexpr float kNearestM = 0.01F;
 constexpr float kExplainedPx = 0.75F;  // What is no noise is explained by so much of a pixel.
 /// Of a gradient, what its direction errs by, in what is stated: a pixel that sees one ray makes
 /// steps of slanted edges, which slide along them. Steps trust it all the same, weak edges are
@@ -36,7 +34,6 @@ constexpr std::size_t kSurfaceParts = 12;
 
 /// Of the unknowns that are solved for; lies on the stack.
 using UpToEight = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 8, 8>;
-using Chunk = Eigen::Array<float, static_cast<int>(kChunk), 1>;
 using ConstMap = Eigen::Map<const Eigen::ArrayXf>;
 
 ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::size_t count) {
@@ -46,8 +43,8 @@ ConstMap AlignerPart(const std::vector<float>& values, std::size_t begin, std::s
 /// Points that follow each other err together; so many are one part of the covariance. There must
 /// be clearly more parts than unknowns.
 std::size_t PartSize(std::size_t points) {
-  constexpr std::size_t kParts = 32, kLeast = 16;
-  return std::clamp(points / kParts, kLeast, kChunk);
+  constexpr std::size_t kParts = 32, kLeast = 16, kMultipleOf = 8;
+  return std::clamp(points / kParts / kMultipleOf * kMultipleOf, kLeast, kChunk);
 }
 
 /// With the movements that no edge shows. Edges of one direction leave one unseen; its variance is
@@ -76,48 +73,17 @@ void Aligner::Reserve(std::size_t points) {
   }
 }
 
-/// Equation (2) of docs/explanation/odometry.md for all points.
 void Aligner::Evaluate(const EdgePoints& points, const cv::Mat& grey,
                        const geo::CameraIntrinsics& camera, const AlignmentState& state,
                        Residuals& residuals) const {
-  const Eigen::Matrix3f rotation = state.new_from_reference.linear().cast<float>();
-  const Eigen::Vector3f translation = state.new_from_reference.translation().cast<float>();
-  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
-  const auto gain = static_cast<float>(state.gain), bias = static_cast<float>(state.bias);
-  const auto last_u = static_cast<float>(grey.cols - 1), last_v = static_cast<float>(grey.rows - 1);
-  residuals.value.resize(points.size());
-  residuals.visible.resize(points.size());
-  residuals.count = 0;
-  Chunk depth, column, row;
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
-    const std::size_t count = std::min(kChunk, points.size() - begin);
-    const auto n = static_cast<Eigen::Index>(count);
-    const auto x = AlignerPart(points.x, begin, count), y = AlignerPart(points.y, begin, count),
-               z = AlignerPart(points.z, begin, count);
-    depth.head(n) = rotation(2, 0) * x + rotation(2, 1) * y + rotation(2, 2) * z + translation.z();
-    column.head(n) =
-        (rotation(0, 0) * x + rotation(0, 1) * y + rotation(0, 2) * z + translation.x()) /
-            depth.head(n) * fx +
-        cx;
-    row.head(n) = (rotation(1, 0) * x + rotation(1, 1) * y + rotation(1, 2) * z + translation.y()) /
-                      depth.head(n) * fy +
-                  cy;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const float u = column[i], v = row[i];
-      const std::size_t point = begin + static_cast<std::size_t>(i);
-      // Written so that NaN is not visible.
-      if (!(depth[i] > kNearestM && u >= 0 && v >= 0 && u < last_u && v < last_v)) {
-        residuals.value[point] = 0;
-        residuals.visible[point] = 0;
-        continue;
-      }
-      residuals.value[point] =
-          whitening_[point] * (Interpolate(grey, u, v) - gain * points.intensity[point] - bias);
-      residuals.visible[point] = 1;
-      ++residuals.count;
-    }
-  }
+  PointProjection projection;
+  projection.rotation = state.new_from_reference.linear().cast<float>();
+  projection.translation = state.new_from_reference.translation().cast<float>();
+  projection.fx = static_cast<float>(camera.fx), projection.fy = static_cast<float>(camera.fy);
+  projection.cx = static_cast<float>(camera.cx), projection.cy = static_cast<float>(camera.cy);
+  projection.gain = static_cast<float>(state.gain);
+  projection.bias = static_cast<float>(state.bias);
+  EvaluateResiduals(points, whitening_, grey, projection, residuals);
 }
 
 /// Residuals are divided by what they err by, as a multiple of the noise of a grey value: by the
@@ -251,40 +217,16 @@ void Aligner::AddSurfaces(double sigma, double gain) {
 
 /// Equation (7): the Jacobian is the reference's and stays; only the weights change.
 void Aligner::BuildNormalEquations(const EdgePoints& points, double sigma, double gain) {
-  const auto k = static_cast<float>(config_.huber_k * sigma);
+  const auto huber = static_cast<float>(config_.huber_k * sigma);
+  const NormalSums sums =
+      SumNormalEquations(points, whitening_, current_, huber, PartSize(points.size()));
+  const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
   normal_.setZero();
   scatter_.setZero();
   gradient_.setZero();
-  Eigen::Array<float, static_cast<int>(kChunk), kUnknowns> columns, weighted;
-  const int unknowns = config_.estimate_illumination ? kUnknowns : 6;
-  const std::size_t part_size = PartSize(points.size());
-  for (std::size_t begin = 0; begin < points.size(); begin += part_size) {
-    const std::size_t count = std::min(part_size, points.size() - begin);
-    const auto n = static_cast<Eigen::Index>(count);
-    const auto residual = AlignerPart(current_.value, begin, count);
-    const auto visible = AlignerPart(current_.visible, begin, count);
-    for (int i = 0; i < 6; ++i) {
-      columns.col(i).head(n) =
-          AlignerPart(points.jacobian[static_cast<std::size_t>(i)], begin, count);
-    }
-    columns.col(6).head(n) = AlignerPart(points.intensity, begin, count);
-    columns.col(7).head(n).setOnes();
-    const auto factor = AlignerPart(whitening_, begin, count);
-    Chunk weight_all, grey_levels;
-    weight_all.head(n) = visible * factor.square() * (k / residual.abs().max(k));
-    grey_levels.head(n) = residual / factor;
-    Step part = Step::Zero();
-    for (int i = 0; i < unknowns; ++i) {
-      weighted.col(i).head(n) = weight_all.head(n) * columns.col(i).head(n);
-      part[i] = static_cast<double>((weighted.col(i).head(n) * grey_levels.head(n)).sum());
-      for (int j = 0; j <= i; ++j) {
-        normal_(i, j) +=
-            static_cast<double>((weighted.col(i).head(n) * columns.col(j).head(n)).sum());
-      }
-    }
-    gradient_ += part;
-    scatter_ += part * part.transpose();
-  }
+  normal_.topLeftCorner(unknowns, unknowns) = sums.normal.topLeftCorner(unknowns, unknowns);
+  scatter_.topLeftCorner(unknowns, unknowns) = sums.scatter.topLeftCorner(unknowns, unknowns);
+  gradient_.head(unknowns) = sums.gradient.head(unknowns);
   AddSurfaces(sigma, gain);
   normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "geo/camera_intrinsics.h"
+#include "odometry/edge/point_loops.h"
 #include "odometry/edge/point_selector.h"
 #include "odometry/edge/surface_points.h"
 #include "odometry/se3.h"
@@ -99,14 +100,11 @@ class Aligner {
                           double noise);
 
  private:
-  static constexpr int kUnknowns = 8;  // Twist, gain, bias.
-  using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
-  using Step = Eigen::Matrix<double, kUnknowns, 1>;
+  static constexpr int kUnknowns = kAlignmentUnknowns;
+  using Normal = NormalSums::Normal;
+  using Step = NormalSums::Step;
 
-  struct Residuals {
-    std::vector<float> value;
-    std::vector<float> visible;  // 1 or 0.
-    std::size_t count = 0;       // Visible ones.
+  struct Residuals : PointResiduals {
     SurfaceDistances distances;  // To the surfaces.
   };
 
