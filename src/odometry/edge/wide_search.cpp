@@ -74,6 +74,7 @@ double PixelsBetween(const Eigen::Isometry3d& one, const Eigen::Isometry3d& othe
 void WideSearch::Reserve(std::size_t points, std::size_t thumbnail_pixels) {
   aligner_.Reserve(points);
   shifts_.Reserve(thumbnail_pixels);
+  differences_.resize(MotionProposals::kMost);
 }
 
 void WideSearch::ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals) {
@@ -235,24 +236,23 @@ void WideSearch::AskPicture(const Reference& reference, const ImagePyramid& imag
   double best = 0;
   for (std::size_t i = 0; i < count_; ++i) best = std::max(best, candidates_[i].score);
   const double enough = std::max(0.0, best - (is_finest ? kNearlyAsMuch : kNearlyAsMuchCoarsely));
-  PicturePoints::Differences differences;
-  const auto compare = [&](const Candidate& candidate) {
-    differences.count = 0;
-    if (candidate.score <= enough) return false;
-    reference.picture->Compare(images[level], camera, candidate.result.state.new_from_reference,
-                               is_finest ? 1 : kCoarseEvery, differences);
-    return differences.count > 0;
-  };
+  differences_.resize(MotionProposals::kMost);  // No memory where Reserve was called.
   double least_sigma = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count_; ++i) {
-    if (compare(candidates_[i])) least_sigma = std::min(least_sigma, differences.Sigma());
+    PicturePoints::Differences& differences = differences_[i];
+    differences.count = 0;
+    if (candidates_[i].score <= enough) continue;
+    reference.picture->Compare(images[level], camera,
+                               candidates_[i].result.state.new_from_reference,
+                               is_finest ? 1 : kCoarseEvery, differences);
+    least_sigma = std::min(least_sigma, differences.Sigma());
   }
   const double bound = PictureBound(std::max(least_sigma, reference.picture_noise));
   std::array<std::optional<double>, MotionProposals::kMost> shares;
   double least = 1;
   for (std::size_t i = 0; i < count_; ++i) {
-    if (!compare(candidates_[i])) continue;
-    shares[i] = differences.ShareWithin(bound);
+    if (differences_[i].count == 0) continue;
+    shares[i] = differences_[i].ShareWithin(bound);
     least = std::min(least, *shares[i]);
   }
   for (std::size_t i = 0; i < count_; ++i) candidates_[i].score *= shares[i].value_or(least);

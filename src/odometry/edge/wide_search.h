@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "odometry/edge/aligner.h"
 #include "odometry/edge/image_pyramid.h"
@@ -108,6 +109,7 @@ class WideSearch {
   LevelCameras cameras_;
   ShiftSearch shifts_;
   std::array<Candidate, MotionProposals::kMost> candidates_;
+  std::vector<PicturePoints::Differences> differences_;  // Of each candidate.
   std::size_t count_ = 0;
   double mean_inverse_depth_ = 0;  // Of the points of the last level, 1/m.
   double noise_ = kNoiseGrey;      // Of this search.
