@@ -22,7 +22,7 @@ from change.surroundings import UNSEEN_CHANGE
 from detector.manifest import ManifestError
 
 from .synthetic_change import street, write_pair, write_photos, write_streets
-from .test_programs import quietly
+from .programs import quietly
 
 SIMULATOR = Path(__file__).resolve().parents[2] / "install/lib/livemap/livemap_simulate"
 
