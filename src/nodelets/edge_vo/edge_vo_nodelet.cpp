@@ -567,7 +567,6 @@ class EdgeVoPart : public NodeletPart {
   ros_io::OdometryFrames frames_;
   geo::CameraIntrinsics camera_;
   std::unique_ptr<EyeChoice> choice_;
-  std::unique_ptr<FrameBacklog<Taken>> backlog_;
   std::unique_ptr<odometry::EdgeOdometry> odometry_;  // By depth.
   std::unique_ptr<MonoEye> mono_;                     // By one eye.
   odometry::VehicleSpeed speed_{{}};                  // For one eye.
@@ -587,6 +586,9 @@ class EdgeVoPart : public NodeletPart {
   tf2_ros::TransformBroadcaster tf_broadcaster_;
   ros::Publisher odometry_publisher_, path_publisher_, cloud_publisher_;
   image_transport::Publisher edges_publisher_;
+  // After all that its work uses, and before all that fills or clears it: the work may go on in
+  // another thread until the backlog is destroyed.
+  std::unique_ptr<FrameBacklog<Taken>> backlog_;
   ros::ServiceServer reset_service_;
 
   std::unique_ptr<message_filters::Synchronizer<ImagePolicy>> images_;

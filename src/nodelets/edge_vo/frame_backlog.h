@@ -25,6 +25,7 @@ class FrameBacklog {
   /// `capacity` >= 1 frames may wait, not counting the one in work. `queue` outlives this.
   FrameBacklog(std::size_t capacity, ros::CallbackQueueInterface& queue, Work work)
       : capacity_(capacity), queue_(queue), work_(std::move(work)) {}
+  /// Waits for the frame in work.
   ~FrameBacklog() { queue_.removeByID(Id()); }
   FrameBacklog(const FrameBacklog&) = delete;
   FrameBacklog& operator=(const FrameBacklog&) = delete;

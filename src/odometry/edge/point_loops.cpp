@@ -45,8 +45,8 @@ LIVEMAP_IN_EACH double SumOf(const Lanes& lanes) {
   return static_cast<double>(even + odd);
 }
 
-/// What the loops read and write, without the functions of a library: those would be compiled for
-/// one kind of processor and be called on another.
+/// What the loops read and write, without Eigen: its functions might be compiled for one kind of
+/// processor here and be called on another elsewhere.
 struct ResidualArrays {
   const float *x, *y, *z, *intensity, *factor;
   float *value, *visible;
@@ -143,7 +143,7 @@ LIVEMAP_IN_EACH std::size_t Evaluate(const ResidualArrays& arrays, const GreyPix
       EvaluateBlock(block, image, projection, count);
       continue;
     }
-    // With points at the camera, which nobody sees, up to a whole vector.
+    // Up to a whole vector with points that do not count.
     float rest[kLaneCount][kLaneCount] = {};
     const std::size_t bytes = block.size * sizeof(float);
     std::memcpy(rest[0], block.x, bytes);
@@ -155,7 +155,6 @@ LIVEMAP_IN_EACH std::size_t Evaluate(const ResidualArrays& arrays, const GreyPix
                   image, projection, count);
     std::memcpy(block.value, rest[5], bytes);
     std::memcpy(block.visible, rest[6], bytes);
-    // Where the motion brings them into view.
     for (std::size_t i = block.size; i < kLaneCount; ++i) count[0] -= rest[6][i] > 0 ? 1 : 0;
   }
   std::int32_t sum = 0;
@@ -275,7 +274,7 @@ LIVEMAP_IN_EACH void Sum(const NormalArrays& arrays, float huber, std::size_t pa
     block.size = std::min(kBlock, whole - begin);
     AddBlock(block, huber, part_size, part, out);
   }
-  if (whole < arrays.size) {  // With points that nobody sees up to a whole vector.
+  if (whole < arrays.size) {  // Up to a whole vector with points that nobody sees.
     alignas(32) float rest[kWithArrays + 3][kLaneCount] = {};
     const std::size_t bytes = (arrays.size - whole) * sizeof(float);
     begin_at(whole);

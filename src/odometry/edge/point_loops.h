@@ -9,8 +9,8 @@
 
 namespace livemap::odometry {
 
-/// The loops over all points of an alignment, in the widest vectors that the processor has. On
-/// every processor they give the same numbers: sums are taken in eight lanes wherever they run.
+// The loops over all points of an alignment, in the widest vectors that the processor has. On every
+// processor they give the same numbers: sums are taken in eight lanes wherever they run.
 
 /// A motion of the points, the camera that sees them, and its light.
 struct PointProjection {
