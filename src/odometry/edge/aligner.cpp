@@ -14,7 +14,9 @@ namespace livemap::odometry {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
+/// With fewer of the points in view no motion is told, or than the second with surfaces.
 constexpr double kMinVisibleShare = 0.1;
+constexpr double kMinMeasuredVisibleShare = 0.03;
 constexpr double kFirstDamping = 1e-3;
 constexpr double kLastDamping = 1e3;
 constexpr float kExplainedPx = 0.75F;  // What is no noise is explained by so much of a pixel.
@@ -135,8 +137,8 @@ double Aligner::RobustSigma(const Residuals& residuals) const {
 
 /// Mean of Huber's rho over the visible points, equation (3).
 double Aligner::RobustCost(const Residuals& residuals, double sigma) const {
-  if (static_cast<double>(residuals.count) <
-      kMinVisibleShare * static_cast<double>(residuals.value.size())) {
+  const double least = surfaces_.points == nullptr ? kMinVisibleShare : kMinMeasuredVisibleShare;
+  if (static_cast<double>(residuals.count) < least * static_cast<double>(residuals.value.size())) {
     return std::numeric_limits<double>::infinity();
   }
   const auto k = static_cast<float>(config_.huber_k * sigma);
@@ -341,6 +343,7 @@ std::size_t Aligner::CountExplained(const EdgePoints& points, const Residuals& r
                                     double gain, double noise) const {
   const float per_slope = PerSlope(points);
   const auto explained_px = kExplainedPx * static_cast<float>(gain);
+  noise *= std::min(1.0, gain);  // Light that fades takes the contrast with it.
   std::size_t explained = 0;
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t count = std::min(kChunk, points.size() - begin);

@@ -443,7 +443,7 @@ void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
   const bool explains_little =
       attempt.evidence.agreement < usual_.agreement() - usual_.StrangeDrop();
-  if (!usual_.IsDisplaced(attempt.evidence) && !usual_.LooksUnlike(attempt.evidence) &&
+  if (!usual_.IsDisplaced(attempt.evidence) && usual_.LooksConvincing(attempt.evidence) &&
       !explains_little) {
     return;
   }
@@ -514,15 +514,17 @@ void EdgeOdometry::ProposeByFeatures(Keyframe& keyframe, MotionProposals& propos
 }
 
 /// Searches among the guesses and what thumbnails say; where that is not enough, around what was
-/// found, and among what features say if it is not convincing.
+/// found, among turns to either side and where the surfaces lie on each other, and among what
+/// features say if it is not convincing.
 EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses& guesses) {
-  MotionProposals proposals;
+  MotionProposals proposals, starts;
   for (const Eigen::Isometry3d& guess : guesses) proposals.Add(guess);
   proposals.Add(Eigen::Isometry3d::Identity());
   const auto by_surfaces = keyframe.surfaces.NewFromReference(Depth(), *guesses.begin());
   if (by_surfaces) proposals.Add(*by_surfaces);
   WideSearch::ProposeAround(*guesses.begin(), proposals);
-  if (!wide_search_.ProposeShifts(keyframe, frame_images_, proposals)) return {};
+  if (!wide_search_.ProposeShifts(keyframe, frame_images_, starts)) return {};
+  proposals.Add(starts);
   const Attempt first = SearchAmong(keyframe, proposals);
   const double enough =
       std::max(config_.feature_agreement, usual_.agreement() - usual_.AgreementDrop());
@@ -540,19 +542,28 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeMoves(first.fine.state.new_from_reference,
                            1 / keyframe.finest_points().mean_inverse_depth, proposals);
   WideSearch::ProposeFan(*guesses.begin(), proposals);
-  Attempt second = SearchAmong(keyframe, proposals);
-  second.iterations += first.iterations;
-  for (int i = 0;
-       i < kPeriodSearches && second.evidence.picture.value_or(1) < usual_.LeastPicture(); ++i) {
-    proposals = {};
-    proposals.Add(second.fine.state.new_from_reference);
+  WideSearch::ProposeFan(*guesses.begin(), starts);
+  wide_search_.ProposeOnSurfaces(SurfacesOf(keyframe), starts, proposals);
+  const Attempt further = SearchPeriods(keyframe, SearchAmong(keyframe, proposals));
+  // The coarse levels, which choose whom the finer ones see, may have left the first one's out.
+  const bool was_better = first.good && (!further.good || IsBetter(first, further));
+  Attempt best = was_better ? first : further;
+  best.iterations = first.iterations + further.iterations;
+  return best;
+}
+
+/// As long as what was found looks unlike the keyframe, searches a period of its pattern further.
+EdgeOdometry::Attempt EdgeOdometry::SearchPeriods(Keyframe& keyframe, Attempt found) {
+  for (int i = 0; i < kPeriodSearches && !usual_.LooksConvincing(found.evidence); ++i) {
+    MotionProposals proposals;
+    proposals.Add(found.fine.state.new_from_reference);
     if (!wide_search_.ProposePeriods(proposals)) break;
-    WideSearch::ProposeAround(second.fine.state.new_from_reference, proposals);
-    const int iterations = second.iterations;
-    second = SearchAmong(keyframe, proposals);
-    second.iterations += iterations;
+    WideSearch::ProposeAround(found.fine.state.new_from_reference, proposals);
+    const int iterations = found.iterations;
+    found = SearchAmong(keyframe, proposals);
+    found.iterations += iterations;
   }
-  return second;
+  return found;
 }
 
 /// The rotation that brings the keyframe's thumbnail nearest to the current one's, with the

@@ -208,6 +208,7 @@ class EdgeOdometry {
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
   Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
+  Attempt SearchPeriods(Keyframe& keyframe, Attempt found);
   void ProposeByFeatures(Keyframe& keyframe, MotionProposals& proposals);
   void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;
   void CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const;

@@ -163,9 +163,10 @@ std::optional<double> SurfacePoints::Agreement(const MeasuredDepth& depth,
 std::optional<Eigen::Isometry3d> SurfacePoints::NewFromReference(
     const MeasuredDepth& depth, const Eigen::Isometry3d& start) const {
   constexpr int kIterations = 10;
-  constexpr std::size_t kEvery = SurfacesEvery(true);
+  constexpr std::size_t kEvery = SurfacesEvery(false);
   constexpr double kFirstBound = 3 * kOtherSurface, kNarrower = 0.7;
-  constexpr double kDamping = 1e-3;  // Of what the points know most of.
+  constexpr double kDamping = 1e-3;   // Of what the points know most of.
+  constexpr double kLastStep = 1e-3;  // m, rad.
   Eigen::Isometry3d motion = start;
   double bound = kFirstBound;
   SurfaceDistances distances;
@@ -187,6 +188,7 @@ std::optional<Eigen::Isometry3d> SurfacePoints::NewFromReference(
     const Vector6d step = normal.ldlt().solve(gradient);
     if (!step.allFinite()) return std::nullopt;
     motion = Renormalised(motion * Se3Exp(-step));
+    if (bound == kOtherSurface && step.norm() < kLastStep) break;
     bound = std::max<double>(kOtherSurface, kNarrower * bound);
   }
   return motion;

@@ -34,16 +34,17 @@ double UsualEvidence::StrangeDrop() const { return std::max(drops_.strange, Agre
 
 double UsualEvidence::FoundDrop() const { return std::max(drops_.found, AgreementDrop()); }
 
-double UsualEvidence::LeastPicture() const {
-  return picture_.value() > 0 ? UsuallyLeastPicture() : kConvincingPicture;
-}
-
 bool UsualEvidence::IsDisplaced(const Evidence& evidence) const {
   return evidence.surfaces && *evidence.surfaces < LeastSurfaces();
 }
 
 bool UsualEvidence::LooksUnlike(const Evidence& evidence) const {
   return evidence.picture && picture_.value() > 0 && *evidence.picture < UsuallyLeastPicture();
+}
+
+bool UsualEvidence::LooksConvincing(const Evidence& evidence) const {
+  const double least = picture_.value() > 0 ? UsuallyLeastPicture() : kConvincingPicture;
+  return evidence.picture.value_or(1) >= least;
 }
 
 bool UsualEvidence::IsRecognised(const Evidence& evidence) const {

@@ -39,9 +39,6 @@ class UsualEvidence {
   double StrangeDrop() const;
   /// The same for a camera that finds back.
   double FoundDrop() const;
-  /// The share of the picture below which a frame is strange; before anything is usual, below which
-  /// it does not convince.
-  double LeastPicture() const;
   /// How pixels differ that show the same, grey levels.
   std::optional<double> picture_noise() const { return picture_noise_; }
 
@@ -49,6 +46,9 @@ class UsualEvidence {
   bool IsDisplaced(const Evidence& evidence) const;
   /// Whether its picture does.
   bool LooksUnlike(const Evidence& evidence) const;
+  /// Whether its picture, if one is known, is as usual; before anything is, whether most of it
+  /// looks the same.
+  bool LooksConvincing(const Evidence& evidence) const;
   /// Whether a place that was looked for without any prior looks as places did before.
   bool IsRecognised(const Evidence& evidence) const;
 

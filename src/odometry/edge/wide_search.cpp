@@ -37,7 +37,12 @@ constexpr int kRingTurns = 8;
 constexpr std::array<double, 6> kSideMoves = {0.03, 0.06, 0.09, 0.13, 0.18, 0.24};
 constexpr std::array<double, 2> kHeightMoves = {0.05, 0.1};
 /// Of ProposeFan, rad.
-constexpr std::array<double, 7> kFanTurns = {0.07, 0.1, 0.13, 0.17, 0.21, 0.27, 0.35};
+constexpr std::array<double, 9> kFanTurns = {0.07, 0.1, 0.13, 0.17, 0.21, 0.27, 0.35, 0.43, 0.52};
+/// Of ProposeOnSurfaces: the most motions, how far apart they are at least, px, and how much less
+/// of the surfaces than of the best one's may agree.
+constexpr std::size_t kOnSurfaces = 24;
+constexpr double kOnSurfacesPx = 4;
+constexpr double kOnSurfacesLess = 0.15;
 /// Moves along the optical axis, in mean depths, and turns about it, rad.
 constexpr std::array<double, 4> kAxisMoves = {-0.25, -0.1, 0.1, 0.25};
 constexpr std::array<double, 2> kAxisTurns = {-0.1, 0.1};
@@ -92,6 +97,37 @@ void WideSearch::ProposeFan(const Eigen::Isometry3d& motion, MotionProposals& pr
     for (const double side : {turn, -turn}) {
       proposals.Add(MotionOfTwist(0, 0, 0, 0, side, 0) * motion);
     }
+  }
+}
+
+void WideSearch::ProposeOnSurfaces(const SurfaceConstraint& surfaces, const MotionProposals& starts,
+                                   MotionProposals& proposals) const {
+  if (surfaces.points == nullptr) return;
+  struct OnSurfaces {
+    Eigen::Isometry3d motion;
+    double agreement;
+  };
+  std::array<OnSurfaces, MotionProposals::kMost> found;
+  std::size_t count = 0;
+  for (const Eigen::Isometry3d& start : starts) {
+    const auto motion = surfaces.points->NewFromReference(surfaces.depth, start);
+    const auto agreement = motion ? surfaces.Agreement(*motion, 1) : std::nullopt;
+    if (agreement) found[count++] = {*motion, *agreement};
+  }
+  std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count),
+            [](const OnSurfaces& a, const OnSurfaces& b) { return a.agreement > b.agreement; });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count && kept < kOnSurfaces; ++i) {
+    if (found[i].agreement < found[0].agreement - kOnSurfacesLess) break;
+    const bool known =
+        std::any_of(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept),
+                    [&](const OnSurfaces& better) {
+                      return PixelsBetween(better.motion, found[i].motion, mean_inverse_depth_,
+                                           cameras_.camera[0].fx) < kOnSurfacesPx;
+                    });
+    if (known) continue;
+    found[kept++] = found[i];
+    proposals.Add(found[i].motion);
   }
 }
 

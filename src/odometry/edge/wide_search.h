@@ -23,6 +23,9 @@ class MotionProposals {
   void Add(const Eigen::Isometry3d& motion) {
     if (count_ < kMost) motions_[count_++] = motion;
   }
+  void Add(const MotionProposals& others) {
+    for (const Eigen::Isometry3d& motion : others) Add(motion);
+  }
   const Eigen::Isometry3d* begin() const { return motions_.data(); }
   const Eigen::Isometry3d* end() const { return motions_.data() + count_; }
 
@@ -79,6 +82,12 @@ class WideSearch {
   /// Adds turns to either side of a motion, up to a third of the view: where a pattern repeats
   /// itself, the thumbnails show its periods and not the turn.
   static void ProposeFan(const Eigen::Isometry3d& motion, MotionProposals& proposals);
+
+  /// Adds the motions near these starts for which the surfaces lie on each other, those where most
+  /// agree, and one of those that hardly differ: a pattern that repeats itself does not mislead
+  /// depth. What no surface shows stays as it was at the start. To be called after a search.
+  void ProposeOnSurfaces(const SurfaceConstraint& surfaces, const MotionProposals& starts,
+                         MotionProposals& proposals) const;
 
   /// Adds moves sideways, up and down from a motion, by as much as a pattern on a wall at that mean
   /// depth, m, repeats itself.

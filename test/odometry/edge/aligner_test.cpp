@@ -207,6 +207,23 @@ TEST(Aligner, GainAndBiasAreFoundAndDoNotMoveThePose) {
   EXPECT_LT(Se3Log(result.state.new_from_reference * motion).norm(), 1e-3);
 }
 
+TEST(Aligner, LightThatFadesMakesNoNoiseOfAnEdge) {
+  const SyntheticWall wall(kWallCamera);
+  const EdgePoints points = PointsOf(wall.See(1, Eigen::Isometry3d::Identity()));
+  const RgbdFrame elsewhere = wall.See(2, Pose(0.2, 0.1, 0, 0, 0, 0));
+  Aligner aligner({});
+  const auto explained = [&](double gain) {
+    AlignmentState state;
+    state.gain = gain;
+    state.bias = (1 - gain) * 128;
+    return static_cast<double>(
+               aligner.ExplainedAt(points, elsewhere.grey, kWallCamera, state, kNoiseGrey)) /
+           static_cast<double>(points.size());
+  };
+  // With the noise of full light four times as much of a false motion would be explained.
+  EXPECT_LT(explained(0.3), 2.5 * explained(1));
+}
+
 /// A tenth of the rows are steep stripes that lie half a pixel beside where the gentle rest has
 /// moved to, as rounded edges do: the turn's error, rad.
 double ErrorBySteepEdges(double place_sigma_px, float inverse_depth_sigma) {

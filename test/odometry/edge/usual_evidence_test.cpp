@@ -66,5 +66,15 @@ TEST(UsualEvidence, AtFirstSurfacesAreExpectedAndPicturesAreNot) {
   EXPECT_EQ(usual.agreement(), 0);
 }
 
+TEST(UsualEvidence, APictureThatHardlyLooksTheSameConvincesNotAtFirstEither) {
+  UsualEvidence usual{UsualEvidence::Drops()};
+  EXPECT_FALSE(usual.LooksConvincing(EvidenceOf(0.9, 0.95, 0.2)));
+  EXPECT_TRUE(usual.LooksConvincing(EvidenceOf(0.9, 0.95, 0.85)));
+  EXPECT_TRUE(usual.LooksConvincing(Evidence()));
+  usual = After(10, EvidenceOf(0.9, 0.95, 0.5));
+  EXPECT_TRUE(usual.LooksConvincing(EvidenceOf(0.9, 0.95, 0.4)));
+  EXPECT_FALSE(usual.LooksConvincing(EvidenceOf(0.9, 0.95, 0.3)));
+}
+
 }  // namespace
 }  // namespace livemap::odometry

@@ -124,6 +124,16 @@ TEST(WideSearch, AStepOfAQuarterOfTheViewAlongStripesIsFollowed) {
   EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 20 / 30.0), 0.02);
 }
 
+TEST(WideSearch, AMoveAndATurnAtOncePastStripesAreFollowed) {
+  const MovingThroughRoom moving(320, RoomMotion::kFromSpeed, 3);
+  EXPECT_LT(moving.WorstErrorM(3, 5 / 30.0), 0.005);
+}
+
+TEST(WideSearch, ATurnOf24DegreesToABareWallIsFollowed) {
+  const MovingThroughRoom moving(339, RoomMotion::kFastTurn, 2);
+  EXPECT_LT(moving.WorstErrorM(3, 4 / 30.0), 0.005);
+}
+
 TEST(WideSearch, AMotionThatWasFollowedIsNotForgottenOverTwoRivals) {
   const MovingThroughRoom moving(267, RoomMotion::kFastTurn, 1);
   EXPECT_LT(moving.WorstErrorM(5, 4 / 30.0, 40 / 30.0), 0.01);
