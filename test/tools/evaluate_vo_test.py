@@ -380,6 +380,16 @@ class EvaluateVoTest(unittest.TestCase):
             self.assertLessEqual(figures["ate_rmse_m"], ate_m, name)
             self.assertLessEqual(figures["rpe_rmse_m_per_s"], rpe_mps, name)
 
+    def test_a_hand_whose_pictures_blur_is_followed_at_a_few_frames_per_second(self):
+        sequence = os.path.join(DATA, "rgbd", "seven_scenes_a")
+        if not os.path.isdir(sequence):
+            self.skipTest("skipped, no data")
+        for step in ("5", "7", "10"):
+            with self.subTest(step=step):
+                figures = self.figures(sequence, "--step", step)
+                self.assertEqual(figures["lost"], 0)
+                self.assertLessEqual(figures["ate_rmse_m"], 2 * 0.0224)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -443,7 +443,7 @@ void EdgeOdometry::CastDoubt(std::int64_t stamp_ns, Attempt& attempt) const {
   if (!attempt.good || attempt.ambiguous) return;
   const bool explains_little =
       attempt.evidence.agreement < usual_.agreement() - usual_.StrangeDrop();
-  if (!usual_.IsDisplaced(attempt.evidence) && usual_.LooksConvincing(attempt.evidence) &&
+  if (!usual_.IsDisplaced(attempt.evidence) && !usual_.LooksUnlike(attempt.evidence) &&
       !explains_little) {
     return;
   }
@@ -608,6 +608,10 @@ bool EdgeOdometry::IsGood(const Attempt& attempt) const {
   // Points on one straight edge, or all at one depth beyond measure, do not fix the pose.
   const Eigen::LLT<Matrix6d> determined(result.information);
   const bool is_measured = attempt.evidence.surfaces.value_or(0) >= kSureSurfaces;
+  const bool is_in_place = attempt.evidence.surfaces && !usual_.IsDisplaced(attempt.evidence);
+  const double least_agreement =
+      is_in_place ? usual_.LeastAgreement(config_.min_measured_agreement, config_.min_agreement)
+                  : config_.min_agreement;
   return std::isfinite(result.cost) &&
          IsBelievableMove(result.state.new_from_reference,
                           attempt.keyframe->finest_points().mean_inverse_depth) &&
@@ -615,7 +619,7 @@ bool EdgeOdometry::IsGood(const Attempt& attempt) const {
          determined.info() == Eigen::Success && determined.rcond() > kMinCondition &&
          result.visible >= static_cast<std::size_t>(config_.min_points) &&
          result.Overlap() >= (is_measured ? config_.min_measured_overlap : config_.min_overlap) &&
-         result.sigma <= config_.lost_sigma && result.Agreement() >= config_.min_agreement &&
+         result.sigma <= config_.lost_sigma && result.Agreement() >= least_agreement &&
          attempt.evidence.surfaces.value_or(1) >= config_.min_surfaces &&
          IsBelievableLight(result.state);
 }

@@ -89,8 +89,10 @@ class EdgeOdometry {
     double min_measured_overlap = 0.12;
     /// or residuals of this standard deviation, grey levels.
     double lost_sigma = 30;
-    /// or when less than this share of the points in view is explained.
+    /// or when less than this share of the points in view is explained, or than the second if the
+    /// surfaces in view are where they should be and hardly more is usual: pictures blur,
     double min_agreement = 0.5;
+    double min_measured_agreement = 0.3;
     /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
     double min_surfaces = 0.5;
     /// An alignment is doubted, and the motion searched widely, when its agreement is smaller than

@@ -34,6 +34,10 @@ double UsualEvidence::StrangeDrop() const { return std::max(drops_.strange, Agre
 
 double UsualEvidence::FoundDrop() const { return std::max(drops_.found, AgreementDrop()); }
 
+double UsualEvidence::LeastAgreement(double least, double most) const {
+  return agreement() > 0 ? std::clamp(agreement() - FoundDrop(), least, most) : most;
+}
+
 bool UsualEvidence::IsDisplaced(const Evidence& evidence) const {
   return evidence.surfaces && *evidence.surfaces < LeastSurfaces();
 }

@@ -76,5 +76,16 @@ TEST(UsualEvidence, APictureThatHardlyLooksTheSameConvincesNotAtFirstEither) {
   EXPECT_FALSE(usual.LooksConvincing(EvidenceOf(0.9, 0.95, 0.3)));
 }
 
+TEST(UsualEvidence, AgreementMayBeSmallOnlyWhereItUsuallyVaries) {
+  UsualEvidence usual{UsualEvidence::Drops()};
+  EXPECT_DOUBLE_EQ(usual.LeastAgreement(0.3, 0.5), 0.5);
+  usual = After(10, EvidenceOf(0.9, 0.95, 0.9));
+  EXPECT_DOUBLE_EQ(usual.LeastAgreement(0.3, 0.5), 0.5);
+  usual = After(10, EvidenceOf(0.6, 0.95, 0.9));
+  EXPECT_NEAR(usual.LeastAgreement(0.3, 0.5), 0.45, 1e-9);
+  usual.Add(EvidenceOf(0.2, 0.95, 0.9));
+  EXPECT_DOUBLE_EQ(usual.LeastAgreement(0.3, 0.5), 0.3);
+}
+
 }  // namespace
 }  // namespace livemap::odometry
