@@ -13,35 +13,31 @@ class EdgePairAlignment : public PairAlignment {
   explicit EdgePairAlignment(const geo::CameraIntrinsics& camera)
       : extractor_(config_.edges),
         aligner_(config_.alignment),
-        levels_(odometry::CountLevels({camera.width, camera.height})) {
-    cameras_[0] = camera;
-    for (std::size_t level = 1; level < cameras_.size(); ++level) {
-      cameras_[level] = odometry::HalvedIntrinsics(cameras_[level - 1]);
-    }
-  }
+        cameras_(odometry::LevelCamerasOf(camera)) {}
 
   std::string name() const override { return "edge"; }
 
   void Take(const odometry::RgbdFrame& reference, const odometry::RgbdFrame& image) override {
     reference_.Build(reference.grey);
     image_.Build(image.grey);
-    depths_.Build(reference.depth, reference.depth_units_per_m, config_.depth_range, levels_);
-    for (int level = 0; level < levels_; ++level) {
+    depths_.Build(reference.depth, reference.depth_units_per_m, config_.depth_range,
+                  cameras_.levels);
+    for (int level = 0; level < cameras_.levels; ++level) {
       const auto index = static_cast<std::size_t>(level);
       odometry::PointSelection selection = config_.points;
       selection.max_points = static_cast<std::size_t>(config_.max_points[index]);
       const cv::Mat& grey = reference_[level];
-      selector_.Select({grey, depths_[level], exact_}, extractor_.Extract(grey), cameras_[index],
-                       selection, points_[index]);
+      selector_.Select({grey, depths_[level], exact_}, extractor_.Extract(grey),
+                       cameras_.camera[index], selection, points_[index]);
     }
   }
 
   std::optional<Eigen::Isometry3d> Align(const Eigen::Isometry3d& guess) override {
     odometry::AlignmentState state;
     state.new_from_reference = guess;
-    for (int level = levels_ - 1; level >= 0; --level) {
+    for (int level = cameras_.levels - 1; level >= 0; --level) {
       const auto index = static_cast<std::size_t>(level);
-      state = aligner_.Align(points_[index], image_[level], cameras_[index], state).state;
+      state = aligner_.Align(points_[index], image_[level], cameras_.camera[index], state).state;
     }
     return state.new_from_reference;
   }
@@ -52,8 +48,7 @@ class EdgePairAlignment : public PairAlignment {
   odometry::EdgeExtractor extractor_;
   odometry::PointSelector selector_;
   odometry::Aligner aligner_;
-  int levels_;
-  std::array<geo::CameraIntrinsics, odometry::kMaxLevels> cameras_;
+  odometry::LevelCameras cameras_;
   odometry::ImagePyramid reference_, image_;
   odometry::DepthPyramid depths_;
   std::array<odometry::EdgePoints, odometry::kMaxLevels> points_;

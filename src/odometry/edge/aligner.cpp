@@ -14,7 +14,7 @@ namespace livemap::odometry {
 namespace {
 
 constexpr std::size_t kChunk = 256;  // Points worked off at once: their arrays stay in the cache.
-/// With fewer of the points in view no motion is told, or than the second with surfaces.
+/// With fewer of the points in view no motion is told; with surfaces, with fewer than the second.
 constexpr double kMinVisibleShare = 0.1;
 constexpr double kMinMeasuredVisibleShare = 0.03;
 constexpr double kFirstDamping = 1e-3;

@@ -16,7 +16,8 @@
 
 namespace livemap::odometry {
 
-/// Residuals up to this are the noise of any camera, and are explained on any edge, grey levels.
+/// Residuals up to this are the noise of any camera, and are explained on any edge, grey levels;
+/// less by the gain where the light fades, which takes the contrast with it.
 inline constexpr double kNoiseGrey = 8;
 
 /// What brings the reference's points and grey values into a new image.

@@ -349,7 +349,7 @@ bool EdgeOdometry::IsBetter(const Attempt& found, const Attempt& followed) {
   const auto score = [&](AlignmentResult result) {
     result.explained = aligner_.ExplainedAt(points, frame_images_[level],
                                             cameras_.camera[static_cast<std::size_t>(level)],
-                                            result.state, found.noise);
+                                            result.state, std::min(found.noise, followed.noise));
     return ExplainedScore(result);
   };
   const double of_found = score(found.fine) * (both ? *here : 1);
@@ -545,11 +545,24 @@ EdgeOdometry::Attempt EdgeOdometry::SearchFrom(Keyframe& keyframe, const Guesses
   WideSearch::ProposeFan(*guesses.begin(), starts);
   wide_search_.ProposeOnSurfaces(SurfacesOf(keyframe), starts, proposals);
   const Attempt further = SearchPeriods(keyframe, SearchAmong(keyframe, proposals));
-  // The coarse levels, which choose whom the finer ones see, may have left the first one's out.
-  const bool was_better = first.good && (!further.good || IsBetter(first, further));
-  Attempt best = was_better ? first : further;
+  Attempt best = BetterOf(first, further);
   best.iterations = first.iterations + further.iterations;
   return best;
+}
+
+/// The winner of two searches. The coarse levels, which choose whom the finer ones see, may have
+/// left the first one's out of the second: another motion that explains as much makes that
+/// ambiguous.
+EdgeOdometry::Attempt EdgeOdometry::BetterOf(const Attempt& first, const Attempt& second) {
+  if (!first.good) return second;
+  if (!second.good || IsBetter(first, second)) return first;
+  Attempt either = second;
+  if (!second.ambiguous && !IsBetter(second, first) &&
+      PixelsFrom(first.fine.state.new_from_reference, second) > kRivalPx) {
+    either.ambiguous = true;
+    either.rival = first.fine;
+  }
+  return either;
 }
 
 /// As long as what was found looks unlike the keyframe, searches a period of its pattern further.

@@ -90,7 +90,8 @@ class EdgeOdometry {
     /// or residuals of this standard deviation, grey levels.
     double lost_sigma = 30;
     /// or when less than this share of the points in view is explained, or than the second if the
-    /// surfaces in view are where they should be and hardly more is usual: pictures blur,
+    /// surfaces in view are where they should be, and the last frames' agreement was small or
+    /// varied: pictures blur,
     double min_agreement = 0.5;
     double min_measured_agreement = 0.3;
     /// or when less than this share of the keyframe's surfaces is where this frame's depth is.
@@ -210,6 +211,7 @@ class EdgeOdometry {
   bool IsDoubtful(const Attempt& attempt, std::int64_t stamp_ns) const;
   Attempt SearchAmong(Keyframe& keyframe, const MotionProposals& proposals);
   Attempt SearchFrom(Keyframe& keyframe, const Guesses& guesses);
+  Attempt BetterOf(const Attempt& first, const Attempt& second);
   Attempt SearchPeriods(Keyframe& keyframe, Attempt found);
   void ProposeByFeatures(Keyframe& keyframe, MotionProposals& proposals);
   void TellApart(std::int64_t stamp_ns, Attempt& attempt) const;

@@ -35,7 +35,8 @@ double UsualEvidence::StrangeDrop() const { return std::max(drops_.strange, Agre
 double UsualEvidence::FoundDrop() const { return std::max(drops_.found, AgreementDrop()); }
 
 double UsualEvidence::LeastAgreement(double least, double most) const {
-  return agreement() > 0 ? std::clamp(agreement() - FoundDrop(), least, most) : most;
+  if (agreement() == 0) return most;
+  return std::min(most, std::max(least, agreement() - FoundDrop()));
 }
 
 bool UsualEvidence::IsDisplaced(const Evidence& evidence) const {

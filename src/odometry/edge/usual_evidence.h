@@ -39,7 +39,7 @@ class UsualEvidence {
   double StrangeDrop() const;
   /// The same for a camera that finds back.
   double FoundDrop() const;
-  /// The least agreement of a camera that finds back, from `least` to `most`; `most` before
+  /// The least agreement of a motion that is good, from `least` to `most`; `most` before
   /// anything is usual.
   double LeastAgreement(double least, double most) const;
   /// How pixels differ that show the same, grey levels.

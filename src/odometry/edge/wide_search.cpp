@@ -231,13 +231,15 @@ void WideSearch::Refine(const EdgePoints& points, const ImagePyramid& images, in
 /// camera, this camera's noise is less: what others leave beyond it is not explained.
 void WideSearch::AskNoise(const EdgePoints& points, const cv::Mat& grey,
                           const geo::CameraIntrinsics& camera) {
-  double best = 0, least_cost = std::numeric_limits<double>::infinity();
+  double best = 0, noise = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count_; ++i) best = std::max(best, candidates_[i].score);
   for (std::size_t i = 0; i < count_; ++i) {
     if (candidates_[i].score < best - kNearlyAsMuch) continue;
-    least_cost = std::min(least_cost, candidates_[i].result.cost);
+    const AlignmentResult& result = candidates_[i].result;
+    // As it would be in full light, see Aligner::ExplainedAt.
+    noise =
+        std::min(noise, kNoiseSigmas * std::sqrt(result.cost) / std::min(1.0, result.state.gain));
   }
-  const double noise = kNoiseSigmas * std::sqrt(least_cost);
   if (!(noise < kNoiseGrey)) return;
   noise_ = noise;
   for (std::size_t i = 0; i < count_; ++i) {

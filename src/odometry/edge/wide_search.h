@@ -18,7 +18,7 @@ namespace livemap::odometry {
 /// Motions to begin an alignment with, new_from_reference.
 class MotionProposals {
  public:
-  static constexpr std::size_t kMost = 96;
+  static constexpr std::size_t kMost = 112;
   /// More than kMost are passed over.
   void Add(const Eigen::Isometry3d& motion) {
     if (count_ < kMost) motions_[count_++] = motion;
@@ -79,8 +79,8 @@ class WideSearch {
   /// more than an alignment can mend and less than a thumbnail shows.
   static void ProposeAround(const Eigen::Isometry3d& motion, MotionProposals& proposals);
 
-  /// Adds turns to either side of a motion, up to a third of the view: where a pattern repeats
-  /// itself, the thumbnails show its periods and not the turn.
+  /// Adds turns to either side of a motion, up to 0.52 rad, half of a usual view: where a pattern
+  /// repeats itself, the thumbnails show its periods and not the turn.
   static void ProposeFan(const Eigen::Isometry3d& motion, MotionProposals& proposals);
 
   /// Adds the motions near these starts for which the surfaces lie on each other, those where most
