@@ -57,8 +57,8 @@ struct AlignmentResult {
   std::size_t points = 0;   ///< Of the reference.
   std::size_t visible = 0;  ///< Of them, those that fall into the new image.
   std::size_t inliers = 0;  ///< Of them, those with full weight.
-  /// Of them, those whose residual is less than half of what a pixel's shift along the gradient
-  /// would make of it, or noise. At a false minimum most edges lie beside each other, however large
+  /// Of them, those whose residual is at most what 0.75 px along the gradient would make of it, or
+  /// noise. At a false minimum most edges lie beside each other, however large
   /// sigma has grown.
   std::size_t explained = 0;
   int iterations = 0;
@@ -95,7 +95,7 @@ class Aligner {
                 const AlignmentState& state, double sigma);
 
   /// How many of the points `state` explains, see AlignmentResult, if residuals up to `noise` grey
-  /// levels are noise, instead of kNoiseGrey.
+  /// levels in full light are noise, instead of kNoiseGrey.
   std::size_t ExplainedAt(const EdgePoints& points, const cv::Mat& grey,
                           const geo::CameraIntrinsics& camera, const AlignmentState& state,
                           double noise);
